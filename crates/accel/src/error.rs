@@ -1,0 +1,57 @@
+//! Why a scene cannot be built.
+
+/// A scene that cannot be built.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BuildError {
+    /// A vertex is NaN or infinite.
+    #[error("mesh {mesh}, geometry {geometry}: vertex {vertex} is not finite")]
+    NotFinite {
+        /// Index of the mesh.
+        mesh: usize,
+        /// Index of the geometry.
+        geometry: usize,
+        /// Index of the vertex.
+        vertex: usize,
+    },
+    /// A triangle names a vertex that is not there.
+    #[error("mesh {mesh}, geometry {geometry}, triangle {triangle}: vertex {index} does not exist (there are {count})")]
+    IndexOutOfRange {
+        /// Index of the mesh.
+        mesh: usize,
+        /// Index of the geometry.
+        geometry: usize,
+        /// Index of the triangle.
+        triangle: usize,
+        /// The vertex it names.
+        index: u32,
+        /// How many vertices there are.
+        count: usize,
+    },
+    /// An instance names a mesh that is not there.
+    #[error("instance {instance}: mesh {mesh} does not exist (there are {count})")]
+    NoSuchMesh {
+        /// Index of the instance.
+        instance: usize,
+        /// The mesh it names.
+        mesh: usize,
+        /// How many meshes there are.
+        count: usize,
+    },
+    /// An instance's transform cannot be inverted well enough.
+    #[error("instance {instance}: its transform is not finite, is singular, or has a condition number above 2^20")]
+    IllConditioned {
+        /// Index of the instance.
+        instance: usize,
+    },
+    /// More elements than indices can count.
+    #[error("{what}: {count} are more than the {limit} that can be indexed")]
+    TooMany {
+        /// What there is too much of.
+        what: &'static str,
+        /// How many there are.
+        count: u64,
+        /// How many there may be.
+        limit: u64,
+    },
+}

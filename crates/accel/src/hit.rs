@@ -1,0 +1,61 @@
+//! Answers.
+
+use glam::DVec3;
+
+/// Which primitive: by the caller's (or file's) order, never the tree's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct HitId {
+    /// Index of the instance.
+    pub instance: u32,
+    /// Index of the geometry in its mesh.
+    pub geometry: u32,
+    /// Index of the triangle in its geometry; 0 for a shape.
+    pub primitive: u32,
+}
+
+/// Where a ray meets the scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// What was hit. Of several at the same `t`, the smallest.
+    pub id: HitId,
+    /// Ray parameter, in lengths of the ray's direction.
+    pub t: f64,
+    /// Weight of the triangle's second vertex; a shape's own first parameter.
+    pub u: f32,
+    /// Weight of the triangle's third vertex; a shape's own second parameter.
+    pub v: f32,
+    /// Unit geometric normal in the world, by the winding of the triangle; never flipped towards the ray. Zero where
+    /// there is none (the apex of a cone).
+    pub normal: DVec3,
+}
+
+/// A point on a surface, known to within an error bound: what rays start from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfacePoint {
+    /// The point in the world.
+    pub position: DVec3,
+    /// Unit geometric normal in the world.
+    pub normal: DVec3,
+    /// The surface lies within this distance of `position` along the normal, with every rounding that a ray from here
+    /// undergoes when it enters the instance again included.
+    pub error: f64,
+}
+
+impl SurfacePoint {
+    /// Where a ray towards `direction` may start so that it is on that side of the surface whatever was rounded: the
+    /// position moved along the normal by the error bound, no further.
+    #[must_use]
+    pub fn spawn(&self, direction: DVec3) -> DVec3 {
+        let side = if direction.dot(self.normal) < 0.0 { -1.0 } else { 1.0 };
+        self.position + self.normal * (side * self.error)
+    }
+}
+
+/// What a query cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TraversalCounts {
+    /// Boxes tested, in both levels.
+    pub boxes: u32,
+    /// Triangles and shapes tested.
+    pub primitives: u32,
+}

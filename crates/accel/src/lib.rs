@@ -1,0 +1,34 @@
+//! Trees over meshes and shapes, and the queries they answer.
+//!
+//! obvhs builds the trees; the layouts, the traversal and every intersection are our own. World space is f64; f32
+//! begins inside an instance.
+//!
+//! ```
+//! use firsthit_accel::{Geometry, SceneBuilder};
+//! use firsthit_geometry::Ray;
+//! use glam::{DAffine3, DVec3, Vec3};
+//!
+//! let mut builder = SceneBuilder::default();
+//! let mesh = builder.add_mesh(vec![Geometry::Triangles {
+//!     positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+//!     triangles: vec![[0, 1, 2]],
+//! }]);
+//! builder.add_instance(mesh, DAffine3::from_translation(DVec3::new(0.0, 0.0, -5.0)));
+//! let scene = builder.build()?;
+//!
+//! let hit = scene.closest_hit(&Ray::new(DVec3::new(0.25, 0.25, 0.0), DVec3::NEG_Z)).unwrap();
+//! assert_eq!((hit.id.instance, hit.id.geometry, hit.id.primitive), (0, 0, 0));
+//! assert_eq!(hit.t, 5.0);
+//! assert!(scene.any_hit(&Ray::segment(DVec3::new(0.25, 0.25, 0.0), DVec3::new(0.25, 0.25, -9.0))));
+//! # Ok::<(), firsthit_accel::BuildError>(())
+//! ```
+
+mod build_options;
+mod error;
+mod hit;
+mod scene;
+
+pub use build_options::{BuildOptions, BuildQuality, Layout};
+pub use error::BuildError;
+pub use hit::{Hit, HitId, SurfacePoint, TraversalCounts};
+pub use scene::{Geometry, Scene, SceneBuilder, SceneStats};

@@ -1,0 +1,28 @@
+//! Model and scene files, read into plain data.
+//!
+//! [`open`] looks at the file's name and first bytes, reads it whole, checks everything in it, and returns a
+//! [`SceneDesc`] with a [`Report`] of what could be read only in part. What cannot be read at all is an
+//! [`ImportError`] that names the file, the place in it and the cause. No ray is traced here.
+//!
+//! | format | module |
+//! |---|---|
+//! | OBJ with MTL (`.obj`, `.obj.zst`) | [`obj`] |
+//! | glTF 2.0 (`.gltf`, `.glb`) | [`gltf`] |
+//! | firsthit scene files (`.toml`, `.json`) | [`toml`] |
+#![forbid(unsafe_code)]
+
+mod error;
+pub mod gltf;
+pub mod image;
+mod limits;
+pub mod obj;
+mod open;
+mod report;
+pub mod scene;
+pub mod toml;
+
+pub use error::{ErrorKind, ImportError};
+pub use limits::Limits;
+pub use open::{Imported, Options, UpAxis, open};
+pub use report::{ExtensionUse, Report, Support, Warning};
+pub use scene::SceneDesc;

@@ -1,0 +1,31 @@
+//! How much a file may ask for.
+
+/// Limits against hostile files, checked before anything is allocated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Largest file that is read, in bytes (also after decompression).
+    pub file_bytes: u64,
+    /// Most vertices, and most triangles, in one scene before instancing.
+    pub elements: u64,
+    /// Most instances in one scene.
+    pub instances: u64,
+    /// Widest or highest image, in pixels.
+    pub image_side: u32,
+    /// Most bytes of decoded images in all.
+    pub image_bytes: u64,
+    /// Deepest nesting of nodes or of files that include files.
+    pub depth: u32,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            file_bytes: 4 << 30,
+            elements: 1 << 30,
+            instances: 1 << 26,
+            image_side: 1 << 15,
+            image_bytes: 8 << 30,
+            depth: 4096,
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! What was read only in part: warnings are data, not log lines.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// Something in a file that could not be honoured, though reading went on.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Warning {
+    /// The file.
+    pub file: PathBuf,
+    /// Where in the file, as in [`crate::ImportError`]; may be empty.
+    pub place: String,
+    /// What is wrong and what was done about it.
+    pub message: String,
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: ", self.file.display())?;
+        if !self.place.is_empty() {
+            write!(f, "{}: ", self.place)?;
+        }
+        f.write_str(&self.message)
+    }
+}
+
+/// How far an extension of a format is honoured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Support {
+    /// Everything it says.
+    Full,
+    /// Some of what it says.
+    Partial,
+    /// Nothing, and nothing in the picture changes by it.
+    Ignored,
+    /// Nothing, though it would matter.
+    Unsupported,
+}
+
+impl Support {
+    /// The word used in reports.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Full => "full",
+            Self::Partial => "partial",
+            Self::Ignored => "ignored",
+            Self::Unsupported => "unsupported",
+        }
+    }
+}
+
+/// An extension that a file names.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ExtensionUse {
+    /// Its name.
+    pub name: String,
+    /// Whether the file cannot do without it.
+    pub required: bool,
+    /// How far it is honoured.
+    pub support: Support,
+    /// One line about what is done with it.
+    pub note: &'static str,
+}
+
+/// What came up while reading.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Report {
+    /// The first warnings, in the order of the file (at most 100 of them).
+    pub warnings: Vec<Warning>,
+    /// How many more there were.
+    pub more_warnings: u64,
+    /// The extensions that the file names.
+    pub extensions: Vec<ExtensionUse>,
+    /// Animations in the file (they are not played).
+    pub animations: u64,
+    /// Triangles after instancing over *every* node of every scene in the file, also those that are not shown.
+    pub triangles_all_scenes: u64,
+}
+
+impl Report {
+    /// Notes a warning.
+    pub fn warn(&mut self, file: impl AsRef<Path>, place: impl Into<String>, message: impl Into<String>) {
+        const KEPT: usize = 100;
+        if self.warnings.len() < KEPT {
+            let file = file.as_ref().to_owned();
+            self.warnings.push(Warning { file, place: place.into(), message: message.into() });
+        } else {
+            self.more_warnings += 1;
+        }
+    }
+
+    /// Takes over what another file's reading brought up.
+    pub fn absorb(&mut self, other: Self) {
+        for w in other.warnings {
+            self.warn(w.file, w.place, w.message);
+        }
+        self.more_warnings += other.more_warnings;
+        for e in other.extensions {
+            if !self.extensions.iter().any(|x| x.name == e.name) {
+                self.extensions.push(e);
+            }
+        }
+        self.animations += other.animations;
+        self.triangles_all_scenes += other.triangles_all_scenes;
+    }
+}

@@ -1,0 +1,505 @@
+//! A scene as plain data: what the files say, in one form, checked.
+//!
+//! # Units and frames
+//! Right-handed, +Y up, lengths in metres. World space is f64; mesh data is f32, in the mesh's own space. Colours are
+//! linear RGB with Rec. 709 primaries. Angles are in radians.
+
+use std::sync::Arc;
+
+use firsthit_geometry::Shape;
+use glam::{Affine2, DAffine3, DVec3, Vec3};
+
+/// A whole scene. All indices are in range: readers check them.
+#[derive(Clone, Debug, Default)]
+pub struct SceneDesc {
+    /// The name of the scene or file.
+    pub name: String,
+    /// Meshes in their own space; several instances may share one.
+    pub meshes: Vec<MeshDesc>,
+    /// Meshes placed in the world.
+    pub instances: Vec<InstanceDesc>,
+    /// Materials.
+    pub materials: Vec<MaterialDesc>,
+    /// Images of the textures.
+    pub images: Vec<ImageDesc>,
+    /// Lights other than glowing surfaces.
+    pub lights: Vec<LightDesc>,
+    /// Cameras of the file.
+    pub cameras: Vec<CameraDesc>,
+    /// What surrounds the scene; `None`: the file does not say.
+    pub environment: Option<EnvironmentDesc>,
+    /// What the file says about how to render it.
+    pub settings: Settings,
+}
+
+/// What a file says about how it is to be rendered.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Settings {
+    /// Width and height of the picture in pixels.
+    pub resolution: Option<(u32, u32)>,
+    /// Longest path, counted in edges (1: what the camera sees glowing, 2: direct light, ...).
+    pub max_path_edges: Option<u32>,
+    /// Renders by exactly the conventions of a reference `scene.json`: plain lobes, bilinear textures without
+    /// mip-maps, no terminator fix, box filter, black where there is no environment.
+    pub reference_conventions: bool,
+}
+
+/// One or more geometries that are placed together and share one tree.
+#[derive(Clone, Debug, Default)]
+pub struct MeshDesc {
+    /// Name in the file.
+    pub name: String,
+    /// Its parts. A hit's `geometry` is the index into this.
+    pub geometries: Vec<GeometryDesc>,
+}
+
+/// A part of a mesh that has one material.
+#[derive(Clone, Debug)]
+pub struct GeometryDesc {
+    /// Name in the file.
+    pub name: String,
+    /// Its surface.
+    pub surface: SurfaceDesc,
+    /// Index into [`SceneDesc::materials`]; `None`: the default material.
+    pub material: Option<usize>,
+}
+
+/// The surface of a geometry.
+#[derive(Clone, Debug)]
+pub enum SurfaceDesc {
+    /// Indexed triangles. A hit's `primitive` is the index of the triangle.
+    Triangles(TriangleMesh),
+    /// An analytic shape; `primitive` is 0.
+    Shape(Shape<f64>),
+}
+
+/// Indexed triangles. All attribute arrays are empty or as long as `positions`; indices are in range; positions are
+/// finite.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TriangleMesh {
+    /// Vertex positions.
+    pub positions: Vec<Vec3>,
+    /// Vertices of each triangle, counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// Unit vertex normals; empty: flat.
+    pub normals: Vec<Vec3>,
+    /// Unit tangents with the handedness (+1 or -1) of the bitangent in `w`; empty: none needed.
+    pub tangents: Vec<glam::Vec4>,
+    /// Texture coordinates by set, (0, 0) at the *upper* left of the image, v downwards (as in glTF).
+    pub uvs: Vec<Vec<glam::Vec2>>,
+    /// Linear vertex colours with alpha; empty: white.
+    pub colors: Vec<glam::Vec4>,
+}
+
+/// A mesh in the world.
+#[derive(Clone, Debug)]
+pub struct InstanceDesc {
+    /// Name of the node.
+    pub name: String,
+    /// Index into [`SceneDesc::meshes`].
+    pub mesh: usize,
+    /// From the mesh's space to the world. May mirror; must be invertible (readers bake or skip what is not).
+    pub transform: DAffine3,
+}
+
+/// How a surface reflects, transmits and emits.
+#[derive(Clone, Debug)]
+pub struct MaterialDesc {
+    /// Name in the file.
+    pub name: String,
+    /// What it is made of.
+    pub model: MaterialModel,
+}
+
+/// The kinds of material.
+#[derive(Clone, Debug)]
+pub enum MaterialModel {
+    /// The glTF metallic-roughness model with its extensions; OBJ materials are mapped onto it.
+    Pbr(Box<PbrMaterial>),
+    /// Two-sided Lambert.
+    Diffuse {
+        /// Share of light reflected.
+        albedo: Vec3,
+    },
+    /// Perfect mirror without Fresnel.
+    Mirror {
+        /// Share of light reflected.
+        reflectance: Vec3,
+    },
+    /// Smooth dielectric: exact Fresnel, no absorption.
+    Glass {
+        /// Index of refraction inside; 1 outside.
+        ior: f32,
+    },
+    /// Isotropic GGX, height-correlated Smith, constant Fresnel, single scattering.
+    RoughMirror {
+        /// GGX alpha.
+        alpha: f32,
+        /// Constant Fresnel reflectance.
+        reflectance: Vec3,
+    },
+    /// Walter 2007 rough dielectric, GGX, uncorrelated Smith.
+    RoughGlass {
+        /// Index of refraction inside; 1 outside.
+        ior: f32,
+        /// GGX alpha.
+        alpha: f32,
+    },
+    /// Glows on the side from which its corners run counter-clockwise (outside, for shapes); black otherwise.
+    Emission {
+        /// Radiance, W/m²·sr.
+        radiance: Vec3,
+    },
+}
+
+/// How alpha is used.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum AlphaMode {
+    /// Alpha is ignored.
+    #[default]
+    Opaque,
+    /// Fully there or not at all, by a cutoff.
+    Mask {
+        /// Least alpha that is there.
+        cutoff: f32,
+    },
+    /// Alpha is coverage.
+    Blend,
+}
+
+/// glTF's metallic-roughness material with extensions. Defaults are the format's.
+#[derive(Clone, Debug)]
+pub struct PbrMaterial {
+    /// Linear base colour and alpha; multiplies the texture (sRGB) and the vertex colour.
+    pub base_color: glam::Vec4,
+    /// sRGB colour with alpha.
+    pub base_color_texture: Option<TextureRef>,
+    /// A texture of opacity alone (OBJ's `map_d`), linear; the channel it names multiplies alpha.
+    pub opacity_texture: Option<TextureRef>,
+    /// 0 dielectric to 1 metal.
+    pub metallic: f32,
+    /// Perceptual roughness: GGX alpha is its square.
+    pub roughness: f32,
+    /// Linear; the channel it names (glTF: B) multiplies `metallic`.
+    pub metallic_texture: Option<TextureRef>,
+    /// Linear; the channel it names (glTF: G) multiplies `roughness`.
+    pub roughness_texture: Option<TextureRef>,
+    /// Linear tangent-space normals.
+    pub normal_texture: Option<TextureRef>,
+    /// Scales the x and y of the normal texture.
+    pub normal_scale: f32,
+    /// A height map (OBJ's `map_bump`), linear, first channel; height = `bump_scale` * value in texture widths.
+    pub bump_texture: Option<TextureRef>,
+    /// Multiplies the height map.
+    pub bump_scale: f32,
+    /// Linear, channel R: share of ambient light. Kept for viewers; a ray tracer finds occlusion itself.
+    pub occlusion_texture: Option<TextureRef>,
+    /// Strength of the occlusion texture.
+    pub occlusion_strength: f32,
+    /// Linear emitted radiance (strength included), W/m²·sr; multiplies the texture.
+    pub emissive: Vec3,
+    /// sRGB.
+    pub emissive_texture: Option<TextureRef>,
+    /// How alpha is used.
+    pub alpha_mode: AlphaMode,
+    /// Whether back faces are shown.
+    pub double_sided: bool,
+    /// Shows the base colour as it is (KHR_materials_unlit).
+    pub unlit: bool,
+    /// Index of refraction (KHR_materials_ior).
+    pub ior: f32,
+    /// Share of light that is not reflected at the surface and goes through (KHR_materials_transmission).
+    pub transmission: f32,
+    /// Linear, channel R multiplies `transmission`.
+    pub transmission_texture: Option<TextureRef>,
+    /// 0: thin walled; > 0: the boundary of a solid (KHR_materials_volume), in mesh units.
+    pub thickness: f32,
+    /// Linear, channel G multiplies `thickness`.
+    pub thickness_texture: Option<TextureRef>,
+    /// Colour that white light turns into over `attenuation_distance`.
+    pub attenuation_color: Vec3,
+    /// In world units; infinite: no absorption.
+    pub attenuation_distance: f32,
+    /// Strength of the dielectric reflection (KHR_materials_specular).
+    pub specular: f32,
+    /// Linear, channel A multiplies `specular`.
+    pub specular_texture: Option<TextureRef>,
+    /// Colour of the dielectric reflection at normal incidence; may exceed 1.
+    pub specular_color: Vec3,
+    /// sRGB; multiplies `specular_color`.
+    pub specular_color_texture: Option<TextureRef>,
+}
+
+impl Default for PbrMaterial {
+    fn default() -> Self {
+        Self {
+            base_color: glam::Vec4::ONE,
+            base_color_texture: None,
+            opacity_texture: None,
+            metallic: 1.0,
+            roughness: 1.0,
+            metallic_texture: None,
+            roughness_texture: None,
+            normal_texture: None,
+            normal_scale: 1.0,
+            bump_texture: None,
+            bump_scale: 1.0,
+            occlusion_texture: None,
+            occlusion_strength: 1.0,
+            emissive: Vec3::ZERO,
+            emissive_texture: None,
+            alpha_mode: AlphaMode::Opaque,
+            double_sided: false,
+            unlit: false,
+            ior: 1.5,
+            transmission: 0.0,
+            transmission_texture: None,
+            thickness: 0.0,
+            thickness_texture: None,
+            attenuation_color: Vec3::ONE,
+            attenuation_distance: f32::INFINITY,
+            specular: 1.0,
+            specular_texture: None,
+            specular_color: Vec3::ONE,
+            specular_color_texture: None,
+        }
+    }
+}
+
+/// How an image is put on a surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TextureRef {
+    /// Index into [`SceneDesc::images`].
+    pub image: usize,
+    /// Which set of texture coordinates; where a mesh lacks it, (0, 0).
+    pub uv_set: usize,
+    /// Applied to the coordinates before the image is looked up.
+    pub transform: Affine2,
+    /// Outside 0..1 in u.
+    pub wrap_u: Wrap,
+    /// Outside 0..1 in v.
+    pub wrap_v: Wrap,
+    /// Between texels.
+    pub filter: Filter,
+    /// Which channel counts where only one is asked for.
+    pub channel: Channel,
+    /// The looked-up value is `value * scale + offset` (OBJ's `-mm`).
+    pub value_scale: f32,
+    /// See `value_scale`.
+    pub value_offset: f32,
+}
+
+impl TextureRef {
+    /// An image as it is: set 0, repeated, filtered.
+    #[must_use]
+    pub fn new(image: usize) -> Self {
+        Self {
+            image,
+            uv_set: 0,
+            transform: Affine2::IDENTITY,
+            wrap_u: Wrap::Repeat,
+            wrap_v: Wrap::Repeat,
+            filter: Filter::Linear,
+            channel: Channel::Red,
+            value_scale: 1.0,
+            value_offset: 0.0,
+        }
+    }
+}
+
+/// A channel of an image.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Channel {
+    /// R
+    #[default]
+    Red,
+    /// G
+    Green,
+    /// B
+    Blue,
+    /// A
+    Alpha,
+    /// Rec. 709 luminance.
+    Luminance,
+}
+
+/// What a texture shows outside its image.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Wrap {
+    /// Again and again.
+    #[default]
+    Repeat,
+    /// Again, mirrored every other time.
+    Mirror,
+    /// Its border.
+    Clamp,
+}
+
+/// How a texture is filtered.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Filter {
+    /// The nearest texel, as the file asks.
+    Nearest,
+    /// Bilinear, anti-aliased where it is small.
+    #[default]
+    Linear,
+}
+
+/// A decoded image, row 0 at the top.
+#[derive(Clone, Debug)]
+pub struct ImageDesc {
+    /// Name or path in the file.
+    pub name: String,
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// The pixels as stored; how to read them (sRGB or linear) is said by where the texture is used.
+    pub pixels: Pixels,
+}
+
+/// Pixels of an image, shared cheaply.
+#[derive(Clone, Debug)]
+pub enum Pixels {
+    /// Eight bits a channel, RGBA.
+    Rgba8(Arc<[[u8; 4]]>),
+    /// Sixteen bits a channel, RGBA.
+    Rgba16(Arc<[[u16; 4]]>),
+    /// Linear floating point, RGB (Radiance, OpenEXR).
+    Rgb32F(Arc<[[f32; 3]]>),
+}
+
+/// A light that is not a surface of a mesh.
+#[derive(Clone, Debug)]
+pub struct LightDesc {
+    /// Name in the file.
+    pub name: String,
+    /// Where it is and how it shines.
+    pub kind: LightKind,
+}
+
+/// The kinds of light. Directions are unit.
+#[derive(Clone, Debug)]
+pub enum LightKind {
+    /// Shines everywhere from a point.
+    Point {
+        /// Where.
+        position: DVec3,
+        /// Radiant intensity, W/sr (glTF: candela).
+        intensity: Vec3,
+        /// Beyond this distance there is no light (glTF's `range`).
+        range: Option<f32>,
+    },
+    /// Shines from a point within a cone.
+    Spot {
+        /// Where.
+        position: DVec3,
+        /// Axis of the cone.
+        direction: DVec3,
+        /// Radiant intensity on the axis, W/sr.
+        intensity: Vec3,
+        /// Half angle of the full intensity.
+        inner: f32,
+        /// Half angle where it ends.
+        outer: f32,
+        /// How it falls off between the two.
+        ramp: SpotRamp,
+        /// As for a point.
+        range: Option<f32>,
+    },
+    /// Parallel light from infinitely far.
+    Directional {
+        /// Where the light travels.
+        direction: DVec3,
+        /// Irradiance on a plane facing it, W/m² (glTF: lux).
+        irradiance: Vec3,
+        /// Angle that the source's disk spans as seen from the scene; 0: sharp shadows.
+        angle: f32,
+    },
+    /// A glowing rectangle, seen by the camera, one-sided.
+    Rectangle {
+        /// One corner.
+        corner: DVec3,
+        /// From the corner along one edge.
+        edge_u: DVec3,
+        /// From the corner along the other; shines towards `edge_u` x `edge_v`.
+        edge_v: DVec3,
+        /// Radiance, W/m²·sr.
+        radiance: Vec3,
+    },
+    /// A glowing ball, seen by the camera.
+    Sphere {
+        /// The middle.
+        center: DVec3,
+        /// Its radius.
+        radius: f64,
+        /// Radiance, W/m²·sr.
+        radiance: Vec3,
+    },
+}
+
+/// How a spot light falls off between its two angles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SpotRamp {
+    /// Square of a ramp in the cosine: KHR_lights_punctual.
+    #[default]
+    Gltf,
+    /// Linear in the angle: the reference scenes.
+    LinearAngle,
+}
+
+/// What surrounds the scene.
+#[derive(Clone, Debug)]
+pub enum EnvironmentDesc {
+    /// The same radiance from everywhere.
+    Constant {
+        /// Radiance, W/m²·sr.
+        radiance: Vec3,
+    },
+    /// A map by longitude and latitude: row 0 at +Y; u = atan2(x, -z) / 2 pi, v = acos(y) / pi.
+    LatLong {
+        /// Index into [`SceneDesc::images`].
+        image: usize,
+        /// Turns the map counter-clockwise seen from +Y, radians.
+        rotation: f32,
+        /// Multiplies the image.
+        scale: Vec3,
+    },
+}
+
+/// A camera.
+#[derive(Clone, Debug)]
+pub struct CameraDesc {
+    /// Name in the file.
+    pub name: String,
+    /// From camera to world: it looks along its -Z, +Y is up.
+    pub transform: DAffine3,
+    /// Its lens.
+    pub projection: Projection,
+}
+
+/// How a camera maps the scene to the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Projection {
+    /// Lines of sight through one point.
+    Perspective {
+        /// Full vertical angle of view, radians.
+        vertical_fov: f64,
+        /// Width / height the camera was made for, if it says.
+        aspect: Option<f64>,
+    },
+    /// Parallel lines of sight.
+    Orthographic {
+        /// Half the height of what is seen, world units.
+        half_height: f64,
+        /// Width / height the camera was made for, if it says.
+        aspect: Option<f64>,
+    },
+}
+
+impl Default for MaterialDesc {
+    /// glTF's default material.
+    fn default() -> Self {
+        Self { name: String::new(), model: MaterialModel::Pbr(Box::default()) }
+    }
+}

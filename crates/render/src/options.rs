@@ -1,0 +1,193 @@
+//! What the caller wants of a picture.
+
+use glam::{DVec3, Vec3};
+
+use crate::{Aov, EffectSet};
+
+/// Everything about how a stage is rendered. The defaults are what `firsthit render MODEL` uses.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RenderOptions {
+    /// Picture width, pixels.
+    pub width: u32,
+    /// Picture height, pixels.
+    pub height: u32,
+    /// Samples per pixel, >= 1.
+    pub spp: u32,
+    /// Most bounces: path edges - 1. 0: only what the camera sees glowing; 1: direct light.
+    pub max_depth: u32,
+    /// Same seed, same bits.
+    pub seed: u64,
+    /// How light is computed.
+    pub integrator: IntegratorChoice,
+    /// Pixels outside this window are left out.
+    pub crop: Option<Crop>,
+    /// Pictures beside the colour.
+    pub aovs: Vec<Aov>,
+    /// Parts of space whose surfaces are cut away (section views).
+    pub clip: Clip,
+}
+
+impl Default for RenderOptions {
+    fn default() -> Self {
+        Self {
+            width: 1280,
+            height: 720,
+            spp: 16,
+            max_depth: 8,
+            seed: 0,
+            integrator: IntegratorChoice::Auto,
+            crop: None,
+            aovs: Vec::new(),
+            clip: Clip::default(),
+        }
+    }
+}
+
+/// How light is computed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum IntegratorChoice {
+    /// Today: `Whitted`.
+    #[default]
+    Auto,
+    /// Direct light, mirror reflection, refraction, transparency.
+    Whitted,
+    /// Direct light alone.
+    Direct,
+    /// Ambient occlusion: the share of the hemisphere that is free.
+    AmbientOcclusion,
+    /// One of the pictures beside the colour as the main one.
+    Aov(Aov),
+}
+
+/// A window of the picture, in pixels from the upper left.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Crop {
+    /// Left edge.
+    pub x: u32,
+    /// Upper edge.
+    pub y: u32,
+    /// Width, > 0.
+    pub width: u32,
+    /// Height, > 0.
+    pub height: u32,
+}
+
+/// Where surfaces are shown. Rays are clipped, so a cut shows the inside.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Clip {
+    /// Only inside this box (world), if given: lower and upper corner.
+    pub bounds: Option<(DVec3, DVec3)>,
+    /// Only where `normal . p <= offset` for every plane.
+    pub planes: Vec<(DVec3, f64)>,
+}
+
+/// What a stage is set up with beside the scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StageOptions {
+    /// Light from around.
+    pub environment: EnvironmentChoice,
+    /// Turns the environment counter-clockwise seen from +Y, radians.
+    pub environment_rotation: f32,
+    /// What the camera sees where there is nothing.
+    pub background: Background,
+    /// Changes to the effects that the scene calls for.
+    pub effects: EffectOverrides,
+    /// Which camera.
+    pub camera: CameraChoice,
+    /// Changes to the camera.
+    pub camera_changes: CameraChanges,
+    /// Width / height of the picture, for framing.
+    pub aspect: f64,
+}
+
+impl Default for StageOptions {
+    fn default() -> Self {
+        Self {
+            environment: EnvironmentChoice::Auto,
+            environment_rotation: 0.0,
+            background: Background::Auto,
+            effects: EffectOverrides::default(),
+            camera: CameraChoice::Auto,
+            camera_changes: CameraChanges::default(),
+            aspect: 16.0 / 9.0,
+        }
+    }
+}
+
+/// Light from around the scene.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum EnvironmentChoice {
+    /// The scene's own; else, where the scene has no lights, the studio.
+    #[default]
+    Auto,
+    /// The built-in studio.
+    Studio,
+    /// Radiance 1 from everywhere.
+    White,
+    /// None.
+    Black,
+    /// A map by longitude and latitude, linear RGB, row 0 at +Y.
+    Map {
+        /// Pixels across.
+        width: u32,
+        /// Pixels down.
+        height: u32,
+        /// Radiance.
+        pixels: std::sync::Arc<[[f32; 3]]>,
+    },
+}
+
+/// What the camera sees where there is nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Background {
+    /// The scene's own environment or the map given; with the studio, a plain light backdrop.
+    #[default]
+    Auto,
+    /// One linear colour.
+    Color(Vec3),
+    /// Nothing: alpha 0.
+    Transparent,
+}
+
+/// Changes to the effects that the scene calls for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct EffectOverrides {
+    /// Only these, instead of what the scene calls for.
+    pub only: Option<EffectSet>,
+    /// These too.
+    pub add: EffectSet,
+    /// Not these.
+    pub remove: EffectSet,
+}
+
+/// Which camera.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum CameraChoice {
+    /// The scene's first camera if it has one and says it is for viewing (scene files), else a framed view.
+    #[default]
+    Auto,
+    /// The file's camera of this name, or else of this index.
+    Named(String),
+}
+
+/// Changes to the chosen camera; the names are F3D's.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CameraChanges {
+    /// World position.
+    pub position: Option<DVec3>,
+    /// World point looked at.
+    pub focal_point: Option<DVec3>,
+    /// Up direction.
+    pub view_up: Option<DVec3>,
+    /// Full vertical angle of view, radians.
+    pub view_angle: Option<f64>,
+    /// Turn around the focal point about the up direction, radians, counter-clockwise seen from above.
+    pub azimuth: f64,
+    /// Turn around the focal point upwards, radians.
+    pub elevation: f64,
+    /// > 1: closer.
+    pub zoom: Option<f64>,
+    /// Parallel projection.
+    pub orthographic: bool,
+}
