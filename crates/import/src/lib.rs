@@ -17,6 +17,7 @@ pub mod image;
 mod limits;
 pub mod obj;
 mod open;
+mod place;
 mod report;
 pub mod scene;
 pub mod toml;

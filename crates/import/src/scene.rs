@@ -39,6 +39,9 @@ pub struct Settings {
     pub resolution: Option<(u32, u32)>,
     /// Longest path, counted in edges (1: what the camera sees glowing, 2: direct light, ...).
     pub max_path_edges: Option<u32>,
+    /// Index into [`SceneDesc::cameras`] of the camera that the file wants to be seen through (scene files say so;
+    /// a model's cameras are only an offer).
+    pub camera: Option<usize>,
     /// Renders by exactly the conventions of a reference `scene.json`: plain lobes, bilinear textures without
     /// mip-maps, no terminator fix, box filter, black where there is no environment.
     pub reference_conventions: bool,
@@ -455,6 +458,13 @@ pub enum EnvironmentDesc {
     Constant {
         /// Radiance, W/m²·sr.
         radiance: Vec3,
+    },
+    /// The renderer's built-in studio.
+    Studio {
+        /// Turns it counter-clockwise seen from +Y, radians.
+        rotation: f32,
+        /// Multiplies its light.
+        scale: Vec3,
     },
     /// A map by longitude and latitude: row 0 at +Y; u = atan2(x, -z) / 2 pi, v = acos(y) / pi.
     LatLong {

@@ -1,0 +1,167 @@
+//! Putting scenes into scenes: merging with indices kept right, and moving.
+
+use glam::{DAffine3, DMat3, DVec3};
+
+use crate::SceneDesc;
+use crate::scene::{
+    CameraDesc, EnvironmentDesc, InstanceDesc, LightDesc, LightKind, MaterialModel, PbrMaterial, Projection, TextureRef,
+};
+
+/// What of a scene has a place in the world. Indices are those of the scene it was adopted by.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Placeable {
+    pub(crate) instances: Vec<InstanceDesc>,
+    pub(crate) lights: Vec<LightDesc>,
+    pub(crate) cameras: Vec<CameraDesc>,
+}
+
+impl SceneDesc {
+    /// Adds another scene's content, moved by `transform`. The indices of what is already here stay as they are.
+    ///
+    /// The name and the settings of `self` stay; the environment of `other` is taken over, unmoved, where `self` has
+    /// none. Spheres of light and orthographic cameras grow by the cube root of the transform's determinant.
+    ///
+    /// ```
+    /// use firsthit_import::{SceneDesc, scene::*};
+    /// use glam::{DAffine3, DVec3};
+    ///
+    /// let part = SceneDesc {
+    ///     meshes: vec![MeshDesc::default()],
+    ///     instances: vec![InstanceDesc { name: "part".into(), mesh: 0, transform: DAffine3::IDENTITY }],
+    ///     ..SceneDesc::default()
+    /// };
+    /// let mut scene = part.clone();
+    /// scene.append(part, DAffine3::from_translation(DVec3::X));
+    /// assert_eq!(scene.instances[1].mesh, 1);
+    /// assert_eq!(scene.instances[1].transform.translation, DVec3::X);
+    /// ```
+    pub fn append(&mut self, other: Self, transform: DAffine3) {
+        let parts = self.adopt(other);
+        self.place(parts, transform);
+    }
+
+    /// Takes over the data of another scene; what has a place is handed back, to be placed any number of times.
+    pub(crate) fn adopt(&mut self, mut other: Self) -> Placeable {
+        let (mesh, material, image) = (self.meshes.len(), self.materials.len(), self.images.len());
+        for geometry in other.meshes.iter_mut().flat_map(|m| &mut m.geometries) {
+            if let Some(index) = &mut geometry.material {
+                *index += material;
+            }
+        }
+        for m in &mut other.materials {
+            if let MaterialModel::Pbr(pbr) = &mut m.model {
+                pbr.textures_mut().into_iter().flatten().for_each(|t| t.image += image);
+            }
+        }
+        if self.environment.is_none() {
+            if let Some(EnvironmentDesc::LatLong { image: index, .. }) = &mut other.environment {
+                *index += image;
+            }
+            self.environment = other.environment;
+        }
+        other.instances.iter_mut().for_each(|i| i.mesh += mesh);
+        self.meshes.append(&mut other.meshes);
+        self.materials.append(&mut other.materials);
+        self.images.append(&mut other.images);
+        Placeable { instances: other.instances, lights: other.lights, cameras: other.cameras }
+    }
+
+    /// Places what was adopted.
+    pub(crate) fn place(&mut self, parts: Placeable, transform: DAffine3) {
+        self.instances.extend(parts.instances.into_iter().map(|i| i.moved(transform)));
+        self.lights.extend(parts.lights.into_iter().map(|l| l.moved(transform)));
+        self.cameras.extend(parts.cameras.into_iter().map(|c| c.moved(transform)));
+    }
+
+    /// Moves everything that has a place: instances, lights, cameras. The environment stays.
+    pub fn transform(&mut self, by: DAffine3) {
+        let parts = Placeable {
+            instances: std::mem::take(&mut self.instances),
+            lights: std::mem::take(&mut self.lights),
+            cameras: std::mem::take(&mut self.cameras),
+        };
+        self.place(parts, by);
+    }
+}
+
+impl PbrMaterial {
+    /// Every texture slot, for whoever has to treat all of them alike.
+    pub(crate) fn textures_mut(&mut self) -> [&mut Option<TextureRef>; 12] {
+        [
+            &mut self.base_color_texture,
+            &mut self.opacity_texture,
+            &mut self.metallic_texture,
+            &mut self.roughness_texture,
+            &mut self.normal_texture,
+            &mut self.bump_texture,
+            &mut self.occlusion_texture,
+            &mut self.emissive_texture,
+            &mut self.transmission_texture,
+            &mut self.thickness_texture,
+            &mut self.specular_texture,
+            &mut self.specular_color_texture,
+        ]
+    }
+}
+
+impl InstanceDesc {
+    fn moved(self, by: DAffine3) -> Self {
+        Self { transform: by * self.transform, ..self }
+    }
+}
+
+impl LightDesc {
+    fn moved(self, by: DAffine3) -> Self {
+        use LightKind::{Directional, Point, Rectangle, Sphere, Spot};
+        let turn = |d: DVec3| by.transform_vector3(d).try_normalize().unwrap_or(d);
+        let kind = match self.kind {
+            Point { position, intensity, range } => Point { position: by.transform_point3(position), intensity, range },
+            Spot { position, direction, intensity, inner, outer, ramp, range } => Spot {
+                position: by.transform_point3(position),
+                direction: turn(direction),
+                intensity,
+                inner,
+                outer,
+                ramp,
+                range,
+            },
+            Directional { direction, irradiance, angle } => {
+                Directional { direction: turn(direction), irradiance, angle }
+            }
+            Rectangle { corner, edge_u, edge_v, radiance } => {
+                let (u, v) = (by.transform_vector3(edge_u), by.transform_vector3(edge_v));
+                // A mirror image shines to the mirrored side: the order of the edges says which.
+                let (edge_u, edge_v) = if by.matrix3.determinant() < 0.0 { (v, u) } else { (u, v) };
+                Rectangle { corner: by.transform_point3(corner), edge_u, edge_v, radiance }
+            }
+            Sphere { center, radius, radiance } => {
+                Sphere { center: by.transform_point3(center), radius: radius * mean_scale(by), radiance }
+            }
+        };
+        Self { name: self.name, kind }
+    }
+}
+
+impl CameraDesc {
+    /// A camera keeps its right angles whatever it stands on: it looks along the moved axis, as upright as before.
+    fn moved(self, by: DAffine3) -> Self {
+        let moved = by * self.transform;
+        let back = moved.matrix3.z_axis.try_normalize();
+        let right = moved.matrix3.y_axis.cross(moved.matrix3.z_axis).try_normalize();
+        let matrix3 = match (back, right) {
+            (Some(back), Some(right)) => DMat3::from_cols(right, back.cross(right), back),
+            _ => self.transform.matrix3,
+        };
+        let projection = match self.projection {
+            Projection::Orthographic { half_height, aspect } => {
+                Projection::Orthographic { half_height: half_height * mean_scale(by), aspect }
+            }
+            perspective @ Projection::Perspective { .. } => perspective,
+        };
+        Self { name: self.name, transform: DAffine3 { matrix3, translation: moved.translation }, projection }
+    }
+}
+
+fn mean_scale(by: DAffine3) -> f64 {
+    by.matrix3.determinant().abs().cbrt()
+}
