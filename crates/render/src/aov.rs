@@ -1,5 +1,8 @@
 //! Pictures beside the colour.
 
+use std::fmt;
+use std::str::FromStr;
+
 /// A picture beside the colour ("arbitrary output variable").
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
@@ -24,4 +27,51 @@ pub enum Aov {
     PrimitiveId,
     /// Boxes and primitives tested, as a heat map.
     Heat,
+}
+
+impl Aov {
+    /// All of them.
+    pub const ALL: [Self; 10] = [
+        Self::Depth,
+        Self::Normal,
+        Self::GeometricNormal,
+        Self::Albedo,
+        Self::Uv,
+        Self::Barycentric,
+        Self::InstanceId,
+        Self::MaterialId,
+        Self::PrimitiveId,
+        Self::Heat,
+    ];
+
+    /// The name used on command lines and of layers in files.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Depth => "depth",
+            Self::Normal => "normal",
+            Self::GeometricNormal => "geometric-normal",
+            Self::Albedo => "albedo",
+            Self::Uv => "uv",
+            Self::Barycentric => "barycentric",
+            Self::InstanceId => "instance-id",
+            Self::MaterialId => "material-id",
+            Self::PrimitiveId => "primitive-id",
+            Self::Heat => "heat",
+        }
+    }
+}
+
+impl fmt::Display for Aov {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Aov {
+    type Err = String;
+
+    fn from_str(s: &str) -> Result<Self, String> {
+        Self::ALL.into_iter().find(|a| a.name() == s).ok_or_else(|| format!("unknown picture '{s}'"))
+    }
 }
