@@ -12,6 +12,7 @@
 #![forbid(unsafe_code)]
 
 mod error;
+mod files;
 pub mod gltf;
 pub mod image;
 mod limits;
