@@ -2,11 +2,16 @@
 
 mod aov;
 mod effects;
+mod material;
+mod monitor;
 mod options;
+mod stats;
 
 pub use aov::Aov;
-pub use effects::EffectSet;
+pub use effects::{EffectEntry, EffectPlan, EffectSet};
+pub use monitor::Monitor;
 pub use options::{
     Background, CameraChanges, CameraChoice, Clip, Crop, EffectOverrides, EnvironmentChoice, IntegratorChoice,
     RenderOptions, StageOptions,
 };
+pub use stats::{RayCounts, RayKind, RenderStats};

@@ -1,0 +1,118 @@
+//! How much of the light is reflected at a boundary, by angle.
+
+use glam::Vec3;
+
+/// Unpolarised Fresnel reflectance of a boundary between dielectrics, 1 at total internal reflection.
+///
+/// `cos` is that of the angle on this side, in 0..1; `eta` is the index of the other side over that of this side.
+pub(crate) fn dielectric(cos: f32, eta: f32) -> f32 {
+    let Some(cos_t) = refracted_cos(cos, eta) else { return 1.0 };
+    let parallel = (eta * cos - cos_t) / (eta * cos + cos_t);
+    let perpendicular = (cos - eta * cos_t) / (cos + eta * cos_t);
+    let f = 0.5 * (parallel * parallel + perpendicular * perpendicular);
+    if f <= 1.0 { f } else { 1.0 }
+}
+
+/// Cosine of the refracted angle by Snell's law; `None` at total internal reflection.
+pub(crate) fn refracted_cos(cos: f32, eta: f32) -> Option<f32> {
+    let sin2 = (1.0 - cos * cos).max(0.0) / (eta * eta);
+    (sin2 < 1.0).then(|| (1.0 - sin2).sqrt())
+}
+
+/// Reflectance of a dielectric at normal incidence.
+pub(crate) fn normal_incidence(ior: f32) -> f32 {
+    let r = (ior - 1.0) / (ior + 1.0);
+    r * r
+}
+
+/// A law of reflectance.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Fresnel {
+    /// The same at all angles.
+    Constant(Vec3),
+    /// Schlick's approximation, as glTF has it.
+    Schlick {
+        /// Reflectance along the normal.
+        f0: Vec3,
+        /// Reflectance along the surface.
+        f90: Vec3,
+        /// Index of the other side over that of this side where the surface is the boundary of a solid, else 1. Only
+        /// matters below 1: then the refracted angle counts, and there is total internal reflection.
+        eta: f32,
+    },
+    /// The exact law for dielectrics: see [`dielectric`].
+    Dielectric {
+        /// Index of the other side over that of this side.
+        eta: f32,
+    },
+}
+
+impl Fresnel {
+    /// Reflectance at an angle of this cosine, on this side.
+    pub(crate) fn reflectance(&self, cos: f32) -> Vec3 {
+        match *self {
+            Self::Constant(f) => f,
+            Self::Schlick { f0, f90, eta } => {
+                let cos = if eta < 1.0 { refracted_cos(cos, eta) } else { Some(cos) };
+                match cos {
+                    Some(cos) => {
+                        let x = (1.0 - cos).clamp(0.0, 1.0);
+                        f0 + (f90 - f0) * (x * x * x * x * x)
+                    }
+                    None => Vec3::ONE,
+                }
+            }
+            Self::Dielectric { eta } => Vec3::splat(dielectric(cos, eta)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The textbook form by angles, in f64.
+    fn by_angles(theta: f64, eta: f64) -> f64 {
+        let s = theta.sin() / eta;
+        if s >= 1.0 {
+            return 1.0;
+        }
+        let t = s.asin();
+        let rs = (theta - t).sin() / (theta + t).sin();
+        let rp = (theta - t).tan() / (theta + t).tan();
+        0.5 * (rs * rs + rp * rp)
+    }
+
+    #[test]
+    fn agrees_with_fresnels_formulas() {
+        for eta in [1.5f64, 1.0 / 1.5, 1.33, 2.4, 0.9] {
+            for k in 1..90 {
+                let theta = f64::from(k).to_radians();
+                let expected = by_angles(theta, eta);
+                let got = f64::from(dielectric(theta.cos() as f32, eta as f32));
+                assert!((got - expected).abs() < 2e-4, "eta {eta}, {k} degrees: {got} instead of {expected}");
+            }
+        }
+        assert!((dielectric(1.0, 1.5) - 0.04).abs() < 1e-7);
+        assert!((normal_incidence(1.5) - 0.04).abs() < 1e-8);
+    }
+
+    #[test]
+    fn brewsters_angle_reflects_no_parallel_light() {
+        let brewster = 1.5f64.atan();
+        let s = by_angles(brewster, 1.5) * 2.0;
+        let t = (brewster.sin() / 1.5).asin();
+        assert!((s - ((brewster - t).sin() / (brewster + t).sin()).powi(2)).abs() < 1e-12);
+        assert!((f64::from(dielectric(brewster.cos() as f32, 1.5)) - 0.5 * s).abs() < 1e-6);
+    }
+
+    #[test]
+    fn total_internal_reflection_begins_at_the_critical_angle() {
+        let critical = (1.0f64 / 1.5).asin();
+        assert!(dielectric((critical - 1e-3).cos() as f32, 1.0 / 1.5) < 1.0);
+        assert_eq!(dielectric((critical + 1e-3).cos() as f32, 1.0 / 1.5), 1.0);
+        let inside = Fresnel::Schlick { f0: Vec3::splat(0.04), f90: Vec3::ONE, eta: 1.0 / 1.5 };
+        assert_eq!(inside.reflectance((critical + 1e-3).cos() as f32), Vec3::ONE);
+        assert!((inside.reflectance(1.0).x - 0.04).abs() < 1e-6);
+    }
+}

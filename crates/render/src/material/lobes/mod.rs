@@ -1,0 +1,111 @@
+//! Lobes: the parts that a surface's scattering is the sum of, one file a lobe.
+//!
+//! Directions are in the shading frame, +z the normal on the side of `wo`; both `wo` (to the viewer) and `wi` (to the
+//! light) point away from the surface. To add a lobe: a file with `eval`, `pdf` and `sample`, a variant of [`Lobe`],
+//! and a line in the tests below, which hold every lobe to the same rules.
+
+mod diffuse;
+mod ggx;
+mod rough_glass;
+mod specular;
+mod thin;
+
+use bitflags::bitflags;
+use glam::Vec3;
+
+pub(crate) use diffuse::Lambert;
+pub(crate) use ggx::GgxReflection;
+pub(crate) use rough_glass::GgxTransmission;
+pub(crate) use specular::{SpecularReflection, SpecularTransmission};
+pub(crate) use thin::ThinTransmission;
+
+bitflags! {
+    /// What kinds of scattering a lobe does, or an integrator follows.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub(crate) struct LobeKind: u8 {
+        /// In all directions of one side.
+        const DIFFUSE = 1;
+        /// About the mirror direction.
+        const REFLECTION = 2;
+        /// About the direction that goes through.
+        const TRANSMISSION = 4;
+    }
+}
+
+/// A direction drawn from a lobe.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LobeSample {
+    /// Where the light comes from.
+    pub(crate) wi: Vec3,
+    /// f * |cos| / pdf; for a delta lobe the share of light that goes this way.
+    pub(crate) weight: Vec3,
+    /// Density over solid angle; `None` for a delta lobe.
+    pub(crate) pdf: Option<f32>,
+}
+
+/// One part of a surface's scattering.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Lobe {
+    /// Even in all directions.
+    Lambert(Lambert),
+    /// A mirror.
+    SpecularReflection(SpecularReflection),
+    /// A clear boundary.
+    SpecularTransmission(SpecularTransmission),
+    /// A rough mirror.
+    GgxReflection(GgxReflection),
+    /// A rough boundary.
+    GgxTransmission(GgxTransmission),
+    /// A thin rough sheet.
+    ThinTransmission(ThinTransmission),
+}
+
+/// Calls a method of whichever lobe it is.
+macro_rules! each {
+    ($self:ident, $lobe:ident => $body:expr) => {
+        match $self {
+            Lobe::Lambert($lobe) => $body,
+            Lobe::SpecularReflection($lobe) => $body,
+            Lobe::SpecularTransmission($lobe) => $body,
+            Lobe::GgxReflection($lobe) => $body,
+            Lobe::GgxTransmission($lobe) => $body,
+            Lobe::ThinTransmission($lobe) => $body,
+        }
+    };
+}
+
+impl Lobe {
+    /// What it does.
+    pub(crate) fn kind(&self) -> LobeKind {
+        match self {
+            Self::Lambert(_) => LobeKind::DIFFUSE,
+            Self::SpecularReflection(_) | Self::GgxReflection(_) => LobeKind::REFLECTION,
+            Self::SpecularTransmission(_) | Self::GgxTransmission(_) | Self::ThinTransmission(_) => {
+                LobeKind::TRANSMISSION
+            }
+        }
+    }
+
+    /// f(wo, wi) * |cos(wi)|; 0 for delta lobes.
+    pub(crate) fn eval(&self, wo: Vec3, wi: Vec3) -> Vec3 {
+        each!(self, lobe => lobe.eval(wo, wi))
+    }
+
+    /// Density of [`Lobe::sample`] over solid angle; 0 for delta lobes.
+    pub(crate) fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+        each!(self, lobe => lobe.pdf(wo, wi))
+    }
+
+    /// Draws a direction. `None`: the light of this draw is lost.
+    pub(crate) fn sample(&self, wo: Vec3, u: [f32; 2]) -> Option<LobeSample> {
+        each!(self, lobe => lobe.sample(wo, u))
+    }
+
+    /// About how much of the light from everywhere goes to `wo`: for choosing between lobes.
+    pub(crate) fn albedo(&self, wo: Vec3) -> Vec3 {
+        each!(self, lobe => lobe.albedo(wo))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,26 @@
+//! Watching a render from outside.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Told how far a render is, and asked whether it shall go on. Called from the rendering threads: be quick.
+pub trait Monitor: Sync {
+    /// `done` of `total` pixel blocks are finished, by `rays` rays so far.
+    fn progress(&self, done: u64, total: u64, rays: u64) {
+        let _ = (done, total, rays);
+    }
+
+    /// True: finish nothing more; the picture so far is returned.
+    fn cancelled(&self) -> bool {
+        false
+    }
+}
+
+/// Watches nothing.
+impl Monitor for () {}
+
+/// Cancels when the flag is set (as by a signal handler).
+impl Monitor for AtomicBool {
+    fn cancelled(&self) -> bool {
+        self.load(Ordering::Relaxed)
+    }
+}

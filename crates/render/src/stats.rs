@@ -1,0 +1,139 @@
+//! What rendering did: rays by kind, samples, seconds.
+
+use std::ops::{AddAssign, Index, IndexMut};
+
+/// Why a ray is cast.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum RayKind {
+    /// From the camera.
+    Camera,
+    /// Towards a point, spot or directional light.
+    ShadowPunctual,
+    /// Towards a glowing surface.
+    ShadowArea,
+    /// Towards the environment.
+    ShadowEnvironment,
+    /// Mirrored or glossy.
+    Reflection,
+    /// Into or out of a solid.
+    Refraction,
+    /// Through a thin transmissive surface.
+    Transmission,
+    /// On through a surface that covers in part.
+    Transparency,
+    /// For ambient occlusion.
+    AmbientOcclusion,
+}
+
+impl RayKind {
+    /// All kinds, in the order of reports.
+    pub const ALL: [Self; 9] = [
+        Self::Camera,
+        Self::ShadowPunctual,
+        Self::ShadowArea,
+        Self::ShadowEnvironment,
+        Self::Reflection,
+        Self::Refraction,
+        Self::Transmission,
+        Self::Transparency,
+        Self::AmbientOcclusion,
+    ];
+
+    /// The name used in reports; the three kinds of shadow ray share one.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Camera => "camera",
+            Self::ShadowPunctual | Self::ShadowArea | Self::ShadowEnvironment => "shadow",
+            Self::Reflection => "reflection",
+            Self::Refraction => "refraction",
+            Self::Transmission => "transmission",
+            Self::Transparency => "transparency",
+            Self::AmbientOcclusion => "ambient-occlusion",
+        }
+    }
+}
+
+/// How many rays of each kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RayCounts([u64; RayKind::ALL.len()]);
+
+impl RayCounts {
+    /// Rays of all kinds together.
+    #[must_use]
+    pub fn total(&self) -> u64 {
+        self.0.iter().sum()
+    }
+
+    /// Shadow rays towards all kinds of light.
+    #[must_use]
+    pub fn shadow(&self) -> u64 {
+        self[RayKind::ShadowPunctual] + self[RayKind::ShadowArea] + self[RayKind::ShadowEnvironment]
+    }
+
+    /// Name and number of each kind by [`RayKind::name`], in the order of reports.
+    #[must_use]
+    pub fn by_name(&self) -> Vec<(&'static str, u64)> {
+        let mut list: Vec<(&'static str, u64)> = Vec::new();
+        for kind in RayKind::ALL {
+            match list.iter_mut().find(|(name, _)| *name == kind.name()) {
+                Some((_, n)) => *n += self[kind],
+                None => list.push((kind.name(), self[kind])),
+            }
+        }
+        list
+    }
+}
+
+impl Index<RayKind> for RayCounts {
+    type Output = u64;
+    fn index(&self, kind: RayKind) -> &u64 {
+        &self.0[kind as usize]
+    }
+}
+
+impl IndexMut<RayKind> for RayCounts {
+    fn index_mut(&mut self, kind: RayKind) -> &mut u64 {
+        &mut self.0[kind as usize]
+    }
+}
+
+impl AddAssign for RayCounts {
+    fn add_assign(&mut self, other: Self) {
+        for (a, b) in self.0.iter_mut().zip(other.0) {
+            *a += b;
+        }
+    }
+}
+
+/// What a render did.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RenderStats {
+    /// Rays by kind.
+    pub rays: RayCounts,
+    /// Samples taken.
+    pub samples: u64,
+    /// Samples whose radiance was not finite or negative, and was dropped to black. Always 0 unless something is
+    /// wrong with the scene's numbers.
+    pub bad_samples: u64,
+    /// Wall-clock seconds.
+    pub seconds: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shadow_rays_are_reported_as_one_kind() {
+        let mut counts = RayCounts::default();
+        counts[RayKind::ShadowArea] += 2;
+        counts[RayKind::ShadowPunctual] += 3;
+        counts += counts;
+        assert_eq!(counts.shadow(), 10);
+        assert_eq!(counts.by_name()[1], ("shadow", 10));
+        assert_eq!(counts.by_name().len(), 7);
+        assert_eq!(counts.total(), 10);
+    }
+}
