@@ -14,10 +14,15 @@
 #![forbid(unsafe_code)]
 
 mod aabb;
+pub mod error;
+pub mod offset;
 mod precision;
 mod ray;
 mod real;
 pub mod shapes;
+pub mod slab;
+pub mod transform;
+pub mod triangle;
 
 pub use aabb::Aabb;
 pub use precision::Precision;

@@ -24,11 +24,15 @@ pub struct Ray<R: Real> {
     pub t_max: R,
 }
 
+// The constructors name the vector type `V`, from which the compiler finds `R`.
 impl<R: Real> Ray<R> {
     /// The ray over `[0, infinity]`.
     #[inline]
     #[must_use]
-    pub fn new(origin: R::Vec3, direction: R::Vec3) -> Self {
+    pub fn new<V: Vector3<R>>(origin: V, direction: V) -> Self
+    where
+        R: Real<Vec3 = V>,
+    {
         Self { origin, direction, t_min: R::ZERO, t_max: R::INFINITY }
     }
 
@@ -42,7 +46,10 @@ impl<R: Real> Ray<R> {
     /// From one point to another: `t` is 0 at `from` and 1 at `to`, both included.
     #[inline]
     #[must_use]
-    pub fn segment(from: R::Vec3, to: R::Vec3) -> Self {
+    pub fn segment<V: Vector3<R>>(from: V, to: V) -> Self
+    where
+        R: Real<Vec3 = V>,
+    {
         Self::new(from, to - from).with_interval(R::ZERO, R::ONE)
     }
 

@@ -1,0 +1,132 @@
+//! The watertight test: Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1) 2013.
+//!
+//! Space is sheared so that the ray becomes an axis; the decision is then made in two dimensions by three edge
+//! functions. A vertex is sheared alike in every triangle that has it, and the edge function of a shared edge is the
+//! exact negative of the neighbour's: `a*b - c*d` with two rounded products has the right sign or is 0, since rounding
+//! is monotone. Where one is 0 all three are computed again in double precision from the same sheared coordinates, and
+//! then the signs are exact. So the sheared mesh has no gaps, and neither has the test.
+
+use super::{TriangleHit, plane_parameter};
+use crate::{Ray, Real, Vector3, error::difference_of_products};
+
+/// What the test needs to know of a ray's direction: made once per ray.
+#[derive(Clone, Copy, Debug)]
+pub struct Shear<R: Real> {
+    /// The axis that the ray follows most.
+    axis: usize,
+    x: R,
+    y: R,
+}
+
+/// Barycentric weights of a hit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Weights<R: Real> {
+    /// Weight of vertex 1, in `[0, 1]`.
+    pub u: R,
+    /// Weight of vertex 2, in `[0, 1]`.
+    pub v: R,
+}
+
+impl<R: Real> Shear<R> {
+    /// Setup for a direction, finite and not zero.
+    #[inline]
+    #[must_use]
+    pub fn new(direction: R::Vec3) -> Self {
+        let a = direction.abs();
+        let axis = if a.x() > a.y() {
+            if a.x() > a.z() { 0 } else { 2 }
+        } else if a.y() > a.z() {
+            1
+        } else {
+            2
+        };
+        let (x, y, z) = permuted::<R>(direction, axis);
+        Self { axis, x: x / z, y: y / z }
+    }
+
+    /// Whether the line through the origin meets the triangle whose vertices are given *relative to the ray's origin*,
+    /// and where; whatever the ray parameter is.
+    ///
+    /// Vertices must lie within about 1e-9 to 1e9 of the origin for `f32`, or products may overflow.
+    #[inline]
+    #[must_use]
+    pub fn weights(&self, vertices: [R::Vec3; 3]) -> Option<Weights<R>> {
+        let [(ax, ay), (bx, by), (cx, cy)] = vertices.map(|p| self.apply(p));
+        let e0 = cx * by - cy * bx;
+        let e1 = ax * cy - ay * cx;
+        let e2 = bx * ay - by * ax;
+        let least = e0.min(e1).min(e2);
+        let most = e0.max(e1).max(e2);
+        if least < R::ZERO && most > R::ZERO {
+            return None;
+        }
+        if e0 == R::ZERO || e1 == R::ZERO || e2 == R::ZERO || !(most - least).is_finite() {
+            return exact([(ax, ay), (bx, by), (cx, cy)]);
+        }
+        let inverse = R::ONE / (e0 + e1 + e2);
+        if !inverse.is_finite() {
+            return exact([(ax, ay), (bx, by), (cx, cy)]);
+        }
+        Some(Weights { u: (e1 * inverse).min(R::ONE), v: (e2 * inverse).min(R::ONE) })
+    }
+
+    /// A point in the sheared plane: the ray is at (0, 0).
+    #[inline(always)]
+    fn apply(&self, p: R::Vec3) -> (R, R) {
+        let (x, y, z) = permuted::<R>(p, self.axis);
+        (x - self.x * z, y - self.y * z)
+    }
+}
+
+/// The components in cyclic order with `axis` last.
+#[inline(always)]
+fn permuted<R: Real>(v: R::Vec3, axis: usize) -> (R, R, R) {
+    match axis {
+        0 => (v.y(), v.z(), v.x()),
+        1 => (v.z(), v.x(), v.y()),
+        _ => (v.x(), v.y(), v.z()),
+    }
+}
+
+/// The decision by edge functions of exact sign.
+#[cold]
+#[inline(never)]
+fn exact<R: Real>([(ax, ay), (bx, by), (cx, cy)]: [(R, R); 3]) -> Option<Weights<R>> {
+    let e0 = difference_of_products(cx, by, cy, bx);
+    let e1 = difference_of_products(ax, cy, ay, cx);
+    let e2 = difference_of_products(bx, ay, by, ax);
+    if e0.min(e1).min(e2) < 0.0 && e0.max(e1).max(e2) > 0.0 {
+        return None;
+    }
+    let sum = e0 + e1 + e2;
+    let (u, v) = (e1 / sum, e2 / sum);
+    // A sum of 0 (no area in the sheared plane) makes both NaN.
+    (u >= 0.0 && v >= 0.0).then(|| Weights { u: R::from_f64(u), v: R::from_f64(v) })
+}
+
+/// The hit by the watertight test; `t` from the triangle's plane in double precision, rounded to `R` once.
+///
+/// Any magnitudes: vertices and direction are scaled by powers of two, exactly. `t` is right to one rounding of `R` as
+/// far as the condition of the plane allows double precision to tell.
+///
+/// For many triangles and one ray make a [`Shear`] once instead.
+#[must_use]
+pub fn watertight<R: Real>(vertices: [R::Vec3; 3], ray: &Ray<R>) -> Option<TriangleHit<R>> {
+    if !ray.is_valid() {
+        return None;
+    }
+    // Scaled once before the differences, which may overflow, and once after, when they may have become small.
+    let largest = |v: [R::Vec3; 3]| v[0].abs().max(v[1].abs()).max(v[2].abs()).max_element();
+    let before = largest(vertices).max(ray.origin.abs().max_element()).power_of_two_below();
+    let k = R::ONE / before;
+    let relative = vertices.map(|p| p * k - ray.origin * k);
+    let after = largest(relative).power_of_two_below();
+    let relative = relative.map(|p| p * (R::ONE / after));
+    let length = ray.direction.abs().max_element().power_of_two_below();
+    let direction = ray.direction * (R::ONE / length);
+
+    let w = Shear::new(direction).weights(relative)?;
+    let t = plane_parameter(relative.map(Vector3::to_f64), glam::DVec3::ZERO, direction.to_f64())?;
+    let t = R::from_f64(t * after.to_f64() * before.to_f64() / length.to_f64());
+    ray.contains(t).then_some(TriangleHit { t, u: w.u, v: w.v })
+}
