@@ -1,17 +1,32 @@
 //! From a scene to a picture: effects, materials, lights, cameras, integrators, film and output.
 
 mod aov;
+pub mod camera;
+pub mod distribution;
 mod effects;
+pub mod film;
+pub mod filter;
+pub mod framing;
+pub mod light;
 mod material;
 mod monitor;
 mod options;
+pub mod output;
+pub mod sampler;
 mod stats;
+pub mod texture;
+pub mod view;
+pub mod warp;
 
 pub use aov::Aov;
+pub use camera::{Camera, CameraError};
 pub use effects::{EffectEntry, EffectPlan, EffectSet};
+pub use film::Film;
+pub use light::environment::Environment;
 pub use monitor::Monitor;
 pub use options::{
     Background, CameraChanges, CameraChoice, Clip, Crop, EffectOverrides, EnvironmentChoice, IntegratorChoice,
     RenderOptions, StageOptions,
 };
 pub use stats::{RayCounts, RayKind, RenderStats};
+pub use view::{View, ViewTransform};

@@ -1,0 +1,209 @@
+//! The film: sums of samples, pixel by pixel.
+
+use rayon::prelude::*;
+
+use crate::{Aov, Crop};
+
+/// Samples whose f32 sum is kept before it goes into the f64 total.
+const BLOCK: u32 = 16;
+
+/// The samples of one pixel in one picture, summed in a way that does not depend on pauses.
+///
+/// Each aligned block of 16 samples is summed in f32, the blocks in f64, both in order: rendering in several passes,
+/// wherever they are cut, gives the same bits as rendering at once. As the f64 total of f32 numbers is exact unless
+/// blocks differ by more than about 2^20, blocks rendered elsewhere can be added in any order as well.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Accumulator {
+    total: [f64; 4],
+    block: [f32; 4],
+    count: u32,
+}
+
+impl Accumulator {
+    /// Adds a sample: three values, already multiplied by the fourth, which is coverage.
+    #[inline]
+    pub fn add(&mut self, value: [f32; 4]) {
+        for (sum, x) in self.block.iter_mut().zip(value) {
+            *sum += x;
+        }
+        self.count += 1;
+        if self.count % BLOCK == 0 {
+            self.total = self.sum();
+            self.block = [0.0; 4];
+        }
+    }
+
+    /// How many samples there are.
+    #[inline]
+    #[must_use]
+    pub fn count(&self) -> u32 {
+        self.count
+    }
+
+    /// The mean of the samples; 0 where there are none.
+    #[must_use]
+    pub fn mean(&self) -> [f32; 4] {
+        let n = f64::from(self.count.max(1));
+        self.sum().map(|x| (x / n) as f32)
+    }
+
+    fn sum(&self) -> [f64; 4] {
+        std::array::from_fn(|i| self.total[i] + f64::from(self.block[i]))
+    }
+}
+
+/// What has been rendered: the colour picture and those beside it, in linear f32.
+///
+/// ```
+/// use firsthit_render::Film;
+/// let mut film = Film::new(2, 1, None, &[]);
+/// let mut band = film.bands_mut(8).next().unwrap();
+/// band.pixel(1, 0)[0].add([0.5, 0.25, 0.0, 1.0]);
+/// drop(band);
+/// assert_eq!(film.color().pixels, [[0.0; 4], [0.5, 0.25, 0.0, 1.0]]);
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Film {
+    size: (u32, u32),
+    window: Crop,
+    aovs: Vec<Aov>,
+    /// Row by row, pixel by pixel: the colour, then the AOVs in their order.
+    pixels: Vec<Accumulator>,
+}
+
+/// Some rows of a film, for one thread.
+#[derive(Debug)]
+pub struct Band<'a> {
+    window: Crop,
+    first_row: u32,
+    layers: usize,
+    pixels: &'a mut [Accumulator],
+}
+
+/// A finished picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// Rows from the top. Colours are linear, multiplied by alpha.
+    pub pixels: Vec<[f32; 4]>,
+}
+
+impl Film {
+    /// An empty film for a picture of `width` x `height` pixels. A crop window is cut to the picture.
+    #[must_use]
+    pub fn new(width: u32, height: u32, crop: Option<Crop>, aovs: &[Aov]) -> Self {
+        let whole = Crop { x: 0, y: 0, width, height };
+        let window = crop.map_or(whole, |c| {
+            let (x, y) = (c.x.min(width), c.y.min(height));
+            Crop { x, y, width: c.width.min(width - x), height: c.height.min(height - y) }
+        });
+        let mut unique: Vec<Aov> = Vec::new();
+        for aov in aovs {
+            if !unique.contains(aov) {
+                unique.push(*aov);
+            }
+        }
+        let count = window.width as usize * window.height as usize * (1 + unique.len());
+        Self { size: (width, height), window, aovs: unique, pixels: vec![Accumulator::default(); count] }
+    }
+
+    /// Width and height of the whole picture, of which [`Film::window`] is held.
+    #[must_use]
+    pub fn size(&self) -> (u32, u32) {
+        self.size
+    }
+
+    /// The part of the picture that is held.
+    #[must_use]
+    pub fn window(&self) -> Crop {
+        self.window
+    }
+
+    /// The pictures beside the colour, each once.
+    #[must_use]
+    pub fn aovs(&self) -> &[Aov] {
+        &self.aovs
+    }
+
+    /// The film cut into bands of so many rows, each of which may be filled by another thread. Every pixel belongs to
+    /// one band, so nothing depends on the order in which they are filled.
+    pub fn par_bands_mut(&mut self, rows: u32) -> impl IndexedParallelIterator<Item = Band<'_>> {
+        let (window, layers, rows) = (self.window, 1 + self.aovs.len(), rows.max(1));
+        let size = (window.width as usize * layers * rows as usize).max(1);
+        self.pixels.par_chunks_mut(size).enumerate().map(move |(i, pixels)| Band {
+            window,
+            first_row: window.y + i as u32 * rows,
+            layers,
+            pixels,
+        })
+    }
+
+    /// As [`Film::par_bands_mut`], one after another.
+    pub fn bands_mut(&mut self, rows: u32) -> impl Iterator<Item = Band<'_>> {
+        let (window, layers, rows) = (self.window, 1 + self.aovs.len(), rows.max(1));
+        let size = (window.width as usize * layers * rows as usize).max(1);
+        self.pixels.chunks_mut(size).enumerate().map(move |(i, pixels)| Band {
+            window,
+            first_row: window.y + i as u32 * rows,
+            layers,
+            pixels,
+        })
+    }
+
+    /// The colour, multiplied by alpha.
+    #[must_use]
+    pub fn color(&self) -> Picture {
+        self.picture(0, Accumulator::mean)
+    }
+
+    /// One of the other pictures: the mean over the samples that hit something, with their share as alpha (not
+    /// multiplied). Where there are none, 0, and for depth infinity.
+    #[must_use]
+    pub fn aov(&self, aov: Aov) -> Option<Picture> {
+        let layer = 1 + self.aovs.iter().position(|a| *a == aov)?;
+        let nothing = if aov == Aov::Depth { f32::INFINITY } else { 0.0 };
+        Some(self.picture(layer, |pixel| {
+            let [x, y, z, covered] = pixel.mean();
+            if covered > 0.0 {
+                [x / covered, y / covered, z / covered, covered]
+            } else {
+                [nothing, nothing, nothing, 0.0]
+            }
+        }))
+    }
+
+    fn picture(&self, layer: usize, value: impl Fn(&Accumulator) -> [f32; 4]) -> Picture {
+        let layers = 1 + self.aovs.len();
+        let pixels = self.pixels.iter().skip(layer).step_by(layers).map(value).collect();
+        Picture { width: self.window.width, height: self.window.height, pixels }
+    }
+}
+
+impl Band<'_> {
+    /// The rows it holds, counted in the whole picture.
+    #[must_use]
+    pub fn rows(&self) -> std::ops::Range<u32> {
+        let row = (self.window.width as usize * self.layers).max(1);
+        self.first_row..self.first_row + (self.pixels.len() / row) as u32
+    }
+
+    /// The columns it holds, counted in the whole picture.
+    #[must_use]
+    pub fn columns(&self) -> std::ops::Range<u32> {
+        self.window.x..self.window.x + self.window.width
+    }
+
+    /// A pixel by its place in the whole picture: the colour, then the AOVs in their order.
+    ///
+    /// # Panics
+    /// When it is not in this band.
+    #[must_use]
+    pub fn pixel(&mut self, x: u32, y: u32) -> &mut [Accumulator] {
+        assert!(self.columns().contains(&x) && self.rows().contains(&y), "pixel ({x}, {y}) is in another band");
+        let i = (y - self.first_row) as usize * self.window.width as usize + (x - self.window.x) as usize;
+        &mut self.pixels[i * self.layers..][..self.layers]
+    }
+}

@@ -1,0 +1,4 @@
+//! Where light comes from.
+
+pub mod environment;
+pub mod studio;

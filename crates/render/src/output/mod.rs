@@ -1,0 +1,147 @@
+//! Pictures into files: whole, or not at all.
+
+mod exr;
+mod hdr;
+mod png;
+
+use std::fs;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+pub use png::write_png;
+
+use crate::{Film, View};
+
+/// A file format for pictures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Format {
+    /// PNG: what a display shows, through the view transform.
+    Png,
+    /// OpenEXR: linear 32-bit floats, with all AOVs.
+    Exr,
+    /// Radiance HDR: linear, three channels of shared exponent.
+    Hdr,
+}
+
+impl Format {
+    /// The format that a file name's extension stands for (`png`, `exr`, `hdr`, in any case).
+    ///
+    /// # Errors
+    /// When there is none or it is not known.
+    pub fn from_path(path: &Path) -> Result<Self, OutputError> {
+        let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+        match extension.as_deref() {
+            Some("png") => Ok(Self::Png),
+            Some("exr") => Ok(Self::Exr),
+            Some("hdr") => Ok(Self::Hdr),
+            _ => Err(OutputError::UnknownFormat { path: path.to_owned() }),
+        }
+    }
+}
+
+/// How many bits a channel of a PNG has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum BitDepth {
+    /// 8 bits.
+    #[default]
+    Eight,
+    /// 16 bits.
+    Sixteen,
+}
+
+/// How a film is written.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct WriteOptions {
+    /// What a PNG shows. EXR and HDR hold the linear values, unexposed.
+    pub view: View,
+    /// Bits a channel of a PNG.
+    pub bit_depth: BitDepth,
+}
+
+/// A picture that could not be written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum OutputError {
+    /// The extension names no format that can be written.
+    #[error("{path}: the extension must be .png, .exr or .hdr", path = path.display())]
+    UnknownFormat {
+        /// The file asked for.
+        path: PathBuf,
+    },
+    /// The picture has no pixels.
+    #[error("the picture has no pixels")]
+    Empty,
+    /// The system refused.
+    #[error("{path}: cannot write: {source}", path = path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+}
+
+/// Writes a film to a file; the format follows the extension. The answer: all files that were written.
+///
+/// EXR holds colour and AOVs in one file. Beside a PNG or HDR, each AOV goes into an EXR of its own:
+/// `picture.depth.exr` beside `picture.png`.
+///
+/// Each file is first written in full under another name in the same folder and then renamed: whoever looks finds the
+/// old file or the new one, never a part.
+///
+/// # Errors
+/// When the extension is unknown, there are no pixels, or the file cannot be written. Then nothing is left behind.
+pub fn write_film(path: &Path, film: &Film, options: &WriteOptions) -> Result<Vec<PathBuf>, OutputError> {
+    let format = Format::from_path(path)?;
+    let failed = |path: &Path| {
+        let path = path.to_owned();
+        move |source| OutputError::Io { path, source }
+    };
+    if film.window().width == 0 || film.window().height == 0 {
+        return Err(OutputError::Empty);
+    }
+    let mut written = vec![path.to_owned()];
+    match format {
+        Format::Png => atomically(path, |out| write_png(out, &film.color(), &options.view, options.bit_depth)),
+        Format::Hdr => atomically(path, |out| hdr::write(out, &film.color())),
+        Format::Exr => atomically(path, |out| exr::write(out, film, exr::Layers::All)),
+    }
+    .map_err(failed(path))?;
+    if format != Format::Exr {
+        for aov in film.aovs() {
+            let beside = path.with_extension(format!("{}.exr", exr::layer_name(*aov)));
+            atomically(&beside, |out| exr::write(out, film, exr::Layers::Only(*aov))).map_err(failed(&beside))?;
+            written.push(beside);
+        }
+    }
+    Ok(written)
+}
+
+/// Writes a file so that it appears whole or not at all.
+fn atomically(path: &Path, write: impl FnOnce(&mut BufWriter<fs::File>) -> io::Result<()>) -> io::Result<()> {
+    let name = path.file_name().ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "not a file name"))?;
+    if path.is_dir() {
+        return Err(io::Error::new(io::ErrorKind::IsADirectory, "is a folder"));
+    }
+    let mut temporary = std::ffi::OsString::from(".");
+    temporary.push(name);
+    temporary.push(format!(".{}.tmp", std::process::id()));
+    let temporary = path.with_file_name(temporary);
+    let result = (|| {
+        let mut out = BufWriter::new(fs::File::create(&temporary)?);
+        write(&mut out)?;
+        out.flush()?;
+        fs::rename(&temporary, path)
+    })();
+    if result.is_err() {
+        // What went wrong first is what the caller should hear of.
+        let _ = fs::remove_file(&temporary);
+    }
+    result
+}
+
+/// Errors of the codecs as those of the system.
+fn other(error: impl std::error::Error + Send + Sync + 'static) -> io::Error {
+    io::Error::other(error)
+}

@@ -1,0 +1,314 @@
+//! Images on surfaces: decoding, wrapping, filtering.
+//!
+//! Values are decoded to linear before they are filtered. Smaller copies (mip levels) are averages of the linear
+//! image over exactly the area each of their texels covers, whatever the size; they are kept in the image's own
+//! number format, so the whole pyramid takes a third more memory than the image.
+
+use std::sync::{Arc, LazyLock};
+
+use firsthit_import::scene::{Channel, Filter, ImageDesc, Pixels, TextureRef, Wrap};
+use glam::{Affine2, Vec2, Vec3, Vec4, Vec4Swizzles};
+
+use crate::light::environment::luminance;
+use crate::view::{linear_to_srgb, srgb_to_linear};
+
+/// What the numbers of an image mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ColorSpace {
+    /// Colours by the sRGB curve (alpha is linear).
+    Srgb,
+    /// As `Srgb`, with alpha as coverage: in smaller copies, colours count by their alpha, so that what is cut out does
+    /// not tint its surroundings.
+    SrgbCoverage,
+    /// Data: normals, roughness.
+    Linear,
+}
+
+/// An image that cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("image '{name}' should have {width} x {height} pixels (at least one), but has {pixels}")]
+pub struct TextureError {
+    /// Its name.
+    pub name: String,
+    /// Pixels across, as stated.
+    pub width: u32,
+    /// Pixels down, as stated.
+    pub height: u32,
+    /// Pixels that there are.
+    pub pixels: usize,
+}
+
+/// An image with its smaller copies.
+#[derive(Clone, Debug)]
+pub struct Texture {
+    space: ColorSpace,
+    /// From the whole image to a single texel.
+    levels: Vec<Level>,
+}
+
+#[derive(Clone, Debug)]
+struct Level {
+    width: u32,
+    height: u32,
+    texels: Pixels,
+}
+
+impl Texture {
+    /// Reads an image; its full-size pixels are shared, not copied.
+    ///
+    /// # Errors
+    /// When the image is empty or its pixels are not as many as it says.
+    pub fn new(image: &ImageDesc, space: ColorSpace) -> Result<Self, TextureError> {
+        let pixels = match &image.pixels {
+            Pixels::Rgba8(p) => p.len(),
+            Pixels::Rgba16(p) => p.len(),
+            Pixels::Rgb32F(p) => p.len(),
+        };
+        if pixels == 0 || u64::from(image.width) * u64::from(image.height) != pixels as u64 {
+            let ImageDesc { name, width, height, .. } = image;
+            return Err(TextureError { name: name.clone(), width: *width, height: *height, pixels });
+        }
+        let mut levels = vec![Level { width: image.width, height: image.height, texels: image.pixels.clone() }];
+        let space = if matches!(image.pixels, Pixels::Rgb32F(_)) { ColorSpace::Linear } else { space };
+        while let Some(last) = levels.last().filter(|l| l.width > 1 || l.height > 1) {
+            let smaller = last.halved(space);
+            levels.push(smaller);
+        }
+        Ok(Self { space, levels })
+    }
+
+    /// Width and height of the whole image in texels.
+    #[must_use]
+    pub fn size(&self) -> (u32, u32) {
+        (self.levels[0].width, self.levels[0].height)
+    }
+
+    /// The linear value of one texel of the whole image; the last ones where there are none.
+    #[must_use]
+    pub fn texel(&self, x: u32, y: u32) -> Vec4 {
+        let level = &self.levels[0];
+        level.texel(self.space, x.min(level.width - 1), y.min(level.height - 1))
+    }
+
+    fn nearest(&self, wrap: [Wrap; 2], uv: Vec2) -> Vec4 {
+        let level = &self.levels[0];
+        let pick = |wrap, t, n| (fold(wrap, t) * n as f32) as u32;
+        self.texel(pick(wrap[0], uv.x, level.width), pick(wrap[1], uv.y, level.height))
+    }
+
+    fn bilinear(&self, level: usize, wrap: [Wrap; 2], uv: Vec2) -> Vec4 {
+        let level = &self.levels[level];
+        let (x, fx) = neighbours(wrap[0], uv.x, level.width);
+        let (y, fy) = neighbours(wrap[1], uv.y, level.height);
+        let along = |y| level.texel(self.space, x[0], y).lerp(level.texel(self.space, x[1], y), fx);
+        along(y[0]).lerp(along(y[1]), fy)
+    }
+
+    /// `width`: of what is looked at, in texels of the whole image.
+    fn trilinear(&self, wrap: [Wrap; 2], uv: Vec2, width: f32) -> Vec4 {
+        let last = self.levels.len() - 1;
+        // NaN and all up to one texel: the whole image.
+        let level = if width > 1.0 { width.log2().min(last as f32) } else { 0.0 };
+        let (below, t) = (level as usize, level.fract());
+        let value = self.bilinear(below, wrap, uv);
+        if t > 0.0 { value.lerp(self.bilinear((below + 1).min(last), wrap, uv), t) } else { value }
+    }
+}
+
+/// A texture as a material uses it: how to look it up, and what to take from it.
+#[derive(Clone, Debug)]
+pub struct TextureLookup {
+    texture: Arc<Texture>,
+    uv_set: usize,
+    transform: Affine2,
+    /// How many texels of the whole image a unit of uv length spans, on average over directions.
+    texels_per_uv: f32,
+    wrap: [Wrap; 2],
+    mode: Mode,
+    channel: Channel,
+    value_scale: f32,
+    value_offset: f32,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Mode {
+    Nearest,
+    Bilinear,
+    Trilinear,
+}
+
+impl TextureLookup {
+    /// A reference to a texture, ready for use. Without `mips`, footprints are ignored and the whole image is looked
+    /// up bilinearly.
+    #[must_use]
+    pub fn new(texture: Arc<Texture>, reference: &TextureRef, mips: bool) -> Self {
+        let (width, height) = texture.size();
+        let area = reference.transform.matrix2.determinant().abs() * width as f32 * height as f32;
+        let mode = match reference.filter {
+            Filter::Nearest => Mode::Nearest,
+            Filter::Linear if mips => Mode::Trilinear,
+            Filter::Linear => Mode::Bilinear,
+        };
+        Self {
+            texture,
+            uv_set: reference.uv_set,
+            transform: reference.transform,
+            texels_per_uv: area.sqrt(),
+            wrap: [reference.wrap_u, reference.wrap_v],
+            mode,
+            channel: reference.channel,
+            value_scale: reference.value_scale,
+            value_offset: reference.value_offset,
+        }
+    }
+
+    /// Which set of texture coordinates to look it up by.
+    #[inline]
+    #[must_use]
+    pub fn uv_set(&self) -> usize {
+        self.uv_set
+    }
+
+    /// The linear colour and alpha at a mesh's texture coordinates, averaged over about `footprint` (a width in those
+    /// coordinates; 0: a point). Any coordinates are taken: NaN and infinite ones as 0.
+    #[inline]
+    #[must_use]
+    pub fn color(&self, uv: Vec2, footprint: f32) -> Vec4 {
+        let value = self.lookup(uv, footprint);
+        (value.xyz() * self.value_scale + self.value_offset).extend(value.w)
+    }
+
+    /// The channel that the reference names, at a mesh's texture coordinates: see [`TextureLookup::color`].
+    #[inline]
+    #[must_use]
+    pub fn scalar(&self, uv: Vec2, footprint: f32) -> f32 {
+        let value = self.lookup(uv, footprint);
+        let value = match self.channel {
+            Channel::Red => value.x,
+            Channel::Green => value.y,
+            Channel::Blue => value.z,
+            Channel::Alpha => value.w,
+            Channel::Luminance => luminance(value.xyz()),
+        };
+        value * self.value_scale + self.value_offset
+    }
+
+    /// One texel's step in the mesh's texture coordinates: what a height map's slope is taken over.
+    #[must_use]
+    pub fn texel_step(&self) -> f32 {
+        if self.texels_per_uv > 0.0 { 1.0 / self.texels_per_uv } else { 1.0 }
+    }
+
+    fn lookup(&self, uv: Vec2, footprint: f32) -> Vec4 {
+        let uv = self.transform.transform_point2(uv);
+        match self.mode {
+            Mode::Nearest => self.texture.nearest(self.wrap, uv),
+            Mode::Bilinear => self.texture.bilinear(0, self.wrap, uv),
+            Mode::Trilinear => self.texture.trilinear(self.wrap, uv, footprint * self.texels_per_uv),
+        }
+    }
+}
+
+/// A coordinate brought into [0, 1]. NaN and infinities give 0.
+fn fold(wrap: Wrap, t: f32) -> f32 {
+    if !t.is_finite() {
+        return 0.0;
+    }
+    match wrap {
+        Wrap::Repeat => t - t.floor(),
+        Wrap::Mirror => {
+            let t = t - 2.0 * (t / 2.0).floor();
+            if t > 1.0 { 2.0 - t } else { t }
+        }
+        Wrap::Clamp => t.clamp(0.0, 1.0),
+    }
+}
+
+/// The two texels beside a coordinate, and how far it lies from the first to the second.
+fn neighbours(wrap: Wrap, t: f32, size: u32) -> ([u32; 2], f32) {
+    let x = fold(wrap, t) * size as f32 - 0.5;
+    let first = x.floor();
+    let index = |i: i64| {
+        let n = i64::from(size);
+        // Mirrored, the border's neighbour is the border itself, as when clamped.
+        (if wrap == Wrap::Repeat { i.rem_euclid(n) } else { i.clamp(0, n - 1) }) as u32
+    };
+    ([index(first as i64), index(first as i64 + 1)], x - first)
+}
+
+/// The sRGB curve for all 8-bit values.
+static SRGB_8: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|i| srgb_to_linear(i as f32 / 255.0)));
+
+impl Level {
+    fn texel(&self, space: ColorSpace, x: u32, y: u32) -> Vec4 {
+        let i = y as usize * self.width as usize + x as usize;
+        match &self.texels {
+            Pixels::Rgba8(p) => {
+                let [r, g, b, a] = p[i];
+                let alpha = f32::from(a) / 255.0;
+                if space == ColorSpace::Linear {
+                    Vec3::new(f32::from(r), f32::from(g), f32::from(b)).extend(f32::from(a)) / 255.0
+                } else {
+                    let curve = &*SRGB_8;
+                    Vec4::new(curve[usize::from(r)], curve[usize::from(g)], curve[usize::from(b)], alpha)
+                }
+            }
+            Pixels::Rgba16(p) => {
+                let v = Vec4::from(p[i].map(f32::from)) / 65535.0;
+                if space == ColorSpace::Linear { v } else { v.xyz().map(srgb_to_linear).extend(v.w) }
+            }
+            Pixels::Rgb32F(p) => {
+                // A stray NaN or infinity in a file must not spread.
+                Vec3::from(p[i].map(|x| if x.is_finite() { x } else { 0.0 })).extend(1.0)
+            }
+        }
+    }
+
+    /// The image at half the size (rounded down, at least 1).
+    fn halved(&self, space: ColorSpace) -> Self {
+        let (width, height) = ((self.width / 2).max(1), (self.height / 2).max(1));
+        let weigh = |v: Vec4| if space == ColorSpace::SrgbCoverage { (v.xyz() * v.w).extend(v.w) } else { v };
+        let values = (0..height).flat_map(|y| {
+            let rows = cover(y, height, self.height);
+            (0..width).map(move |x| {
+                let columns = cover(x, width, self.width);
+                let (mut sum, mut plain) = (Vec4::ZERO, Vec4::ZERO);
+                for (sy, wy) in &rows {
+                    for (sx, wx) in &columns {
+                        let v = self.texel(space, *sx, *sy);
+                        sum += wx * wy * weigh(v);
+                        plain += wx * wy * v;
+                    }
+                }
+                match space {
+                    ColorSpace::SrgbCoverage if sum.w > 0.0 => (sum.xyz() / sum.w).extend(sum.w),
+                    _ => plain,
+                }
+            })
+        });
+        let encode = |v: Vec4| match space {
+            ColorSpace::Linear => v.to_array(),
+            _ => v.xyz().map(linear_to_srgb).extend(v.w).to_array(),
+        };
+        let texels = match &self.texels {
+            Pixels::Rgba8(_) => Pixels::Rgba8(values.map(|v| encode(v).map(|x| (x * 255.0 + 0.5) as u8)).collect()),
+            Pixels::Rgba16(_) => {
+                Pixels::Rgba16(values.map(|v| encode(v).map(|x| (x * 65535.0 + 0.5) as u16)).collect())
+            }
+            Pixels::Rgb32F(_) => Pixels::Rgb32F(values.map(|v| v.xyz().to_array()).collect()),
+        };
+        Self { width, height, texels }
+    }
+}
+
+/// The texels of a row of `from` that the `i`-th of `to` covers, with the shares of it that they fill.
+fn cover(i: u32, to: u32, from: u32) -> Vec<(u32, f32)> {
+    let scale = f64::from(from) / f64::from(to);
+    let (start, end) = (f64::from(i) * scale, f64::from(i + 1) * scale);
+    (start as u32..(end.ceil() as u32).min(from))
+        .map(|k| {
+            let part = (f64::from(k) + 1.0).min(end) - f64::from(k).max(start);
+            (k, (part / scale) as f32)
+        })
+        .collect()
+}

@@ -1,0 +1,150 @@
+//! From linear radiance to what a display shows.
+
+use glam::{Mat3, Vec3};
+
+/// How linear colours are brought into the range of a display.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum ViewTransform {
+    /// Khronos PBR Neutral: base colours come out as they are, highlights roll off.
+    #[default]
+    PbrNeutral,
+    /// AgX (Troy Sobotka): film-like, bright colours turn pale.
+    Agx,
+    /// Clipped, then the sRGB curve.
+    Srgb,
+    /// Clipped: the linear numbers themselves, with no curve.
+    None,
+}
+
+impl ViewTransform {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::PbrNeutral, Self::Agx, Self::Srgb, Self::None];
+
+    /// The name used on command lines.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::PbrNeutral => "pbr-neutral",
+            Self::Agx => "agx",
+            Self::Srgb => "srgb",
+            Self::None => "none",
+        }
+    }
+}
+
+impl std::fmt::Display for ViewTransform {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl std::str::FromStr for ViewTransform {
+    type Err = String;
+
+    fn from_str(s: &str) -> Result<Self, String> {
+        Self::ALL
+            .into_iter()
+            .find(|v| v.name() == s)
+            .ok_or_else(|| format!("unknown tone mapping '{s}' (pbr-neutral, agx, srgb or none)"))
+    }
+}
+
+/// A view transform at an exposure.
+///
+/// ```
+/// use firsthit_render::{View, ViewTransform};
+/// use glam::Vec3;
+/// let view = View { transform: ViewTransform::Srgb, exposure: 1.0 };
+/// assert_eq!(view.apply(Vec3::splat(0.5)), Vec3::ONE);
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct View {
+    /// Which transform.
+    pub transform: ViewTransform,
+    /// Stops: radiance is multiplied by 2 to this before anything else.
+    pub exposure: f32,
+}
+
+impl View {
+    /// The display's values in [0, 1] of a linear colour. NaN and negative components count as 0.
+    #[must_use]
+    pub fn apply(&self, radiance: Vec3) -> Vec3 {
+        // `max` answers 0 for NaN. Infinity becomes the largest number, so that no difference of infinities arises.
+        let c = (radiance * self.exposure.exp2()).map(|x| x.max(0.0).min(f32::MAX));
+        let display = match self.transform {
+            ViewTransform::PbrNeutral => pbr_neutral(c).map(linear_to_srgb),
+            ViewTransform::Agx => agx(c),
+            ViewTransform::Srgb => c.map(linear_to_srgb),
+            ViewTransform::None => c,
+        };
+        display.map(|x| x.max(0.0).min(1.0))
+    }
+}
+
+/// The sRGB curve, IEC 61966-2-1: linear [0, 1] to encoded [0, 1]; clipped outside.
+#[must_use]
+pub fn linear_to_srgb(x: f32) -> f32 {
+    let x = x.clamp(0.0, 1.0);
+    if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// The inverse of [`linear_to_srgb`].
+#[must_use]
+pub fn srgb_to_linear(x: f32) -> f32 {
+    let x = x.clamp(0.0, 1.0);
+    if x <= 0.040_45 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
+}
+
+/// Khronos PBR Neutral Tone Mapper, specification of 2024, with its constants: linear to linear.
+fn pbr_neutral(c: Vec3) -> Vec3 {
+    /// Fresnel reflection of a common dielectric: what a base colour looks brighter by.
+    const F90: f32 = 0.04;
+    const COMPRESSION_START: f32 = 0.8 - F90;
+    const DESATURATION: f32 = 0.15;
+
+    let least = c.min_element();
+    let offset = if least < 2.0 * F90 { least - least * least / (4.0 * F90) } else { F90 };
+    let c = c - offset;
+    let peak = c.max_element();
+    if peak <= COMPRESSION_START {
+        return c;
+    }
+    let d = 1.0 - COMPRESSION_START;
+    let new_peak = 1.0 - d * d / (peak + d - COMPRESSION_START);
+    let keep = 1.0 / (DESATURATION * (peak - new_peak) + 1.0);
+    Vec3::splat(new_peak).lerp(c / peak * new_peak, keep)
+}
+
+/// AgX in its base look: linear to display-encoded.
+///
+/// Troy Sobotka's configuration (<https://github.com/sobotka/AgX>): colours are drawn together ("inset"), taken to
+/// log2 from 10 stops below to 6.5 stops above middle grey, bent by a sigmoid through its pivot with slope 2, and
+/// spread again.
+fn agx(c: Vec3) -> Vec3 {
+    const BELOW: f32 = -10.0;
+    const ABOVE: f32 = 6.5;
+    const MIDDLE_GREY: f32 = 0.18;
+    let inset = Mat3::from_cols(
+        Vec3::new(0.842_401_07, 0.042_401_07, 0.042_401_07),
+        Vec3::new(0.078_436_5, 0.878_436_5, 0.078_436_5),
+        Vec3::new(0.079_162_43, 0.079_162_43, 0.879_162_43),
+    );
+    let log = (inset * c).map(|x| ((x / MIDDLE_GREY).log2().clamp(BELOW, ABOVE) - BELOW) / (ABOVE - BELOW));
+    let pivot = -BELOW / (ABOVE - BELOW);
+    let bent = log.map(|x| {
+        if x < pivot {
+            0.5 - sigmoid_arm(pivot - x, pivot, 3.0)
+        } else {
+            0.5 + sigmoid_arm(x - pivot, 1.0 - pivot, 3.25)
+        }
+    });
+    inset.inverse() * bent
+}
+
+/// One arm of the AgX sigmoid: starts with slope 2 and reaches 1/2 at `end`, the more bent the higher `power`.
+fn sigmoid_arm(x: f32, end: f32, power: f32) -> f32 {
+    const SLOPE: f32 = 2.0;
+    let bend = ((SLOPE * end / 0.5).powf(power) - 1.0) / end.powf(power);
+    SLOPE * x * (1.0 + bend * x.powf(power)).powf(-1.0 / power)
+}
