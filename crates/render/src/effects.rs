@@ -209,11 +209,7 @@ mod tests {
         let mut plan = EffectPlan::default();
         plan.call(EffectSet::SHADOWS | EffectSet::TEXTURES, "test");
         plan.call(EffectSet::SHADOWS, "test");
-        plan.decide(&EffectOverrides {
-            only: None,
-            add: EffectSet::AMBIENT_OCCLUSION,
-            remove: EffectSet::SHADOWS,
-        });
+        plan.decide(&EffectOverrides { only: None, add: EffectSet::AMBIENT_OCCLUSION, remove: EffectSet::SHADOWS });
         assert_eq!(plan.called_for(), EffectSet::SHADOWS | EffectSet::TEXTURES);
         assert_eq!(plan.simulated(), EffectSet::AMBIENT_OCCLUSION | EffectSet::TEXTURES);
         assert_eq!(plan.entries[0].by, ["test"]);

@@ -74,11 +74,8 @@ mod tests {
             let width = 2.0 * s * std::f64::consts::FRAC_PI_2 / f64::from(n);
             for j in 0..m {
                 let phi = (f64::from(j) + 0.5) / f64::from(m) * std::f64::consts::TAU;
-                let w = Vec3::new(
-                    (theta.sin() * phi.cos()) as f32,
-                    (theta.sin() * phi.sin()) as f32,
-                    theta.cos() as f32,
-                );
+                let w =
+                    Vec3::new((theta.sin() * phi.cos()) as f32, (theta.sin() * phi.sin()) as f32, theta.cos() as f32);
                 sum += f64::from(f(w)) * theta.sin() * width * std::f64::consts::TAU / f64::from(m);
             }
         }

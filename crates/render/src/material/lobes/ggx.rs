@@ -42,8 +42,8 @@ impl GgxReflection {
         if !(cos > 0.0 && wo.z > 0.0 && wi.z > 0.0) {
             return None;
         }
-        let weight = self.fresnel.reflectance(cos.min(1.0))
-            * (g2(wo, wi, self.alpha, self.masking) / g1(wo, self.alpha));
+        let weight =
+            self.fresnel.reflectance(cos.min(1.0)) * (g2(wo, wi, self.alpha, self.masking) / g1(wo, self.alpha));
         Some(LobeSample { wi, weight, pdf: Some(visible_pdf(wo, h, self.alpha) / (4.0 * cos)) })
     }
 

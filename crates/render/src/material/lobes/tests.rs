@@ -198,12 +198,8 @@ fn reflection_and_thin_transmission_are_reciprocal() {
 #[test]
 fn refraction_is_reciprocal_up_to_the_scaling_of_radiance() {
     let (eta, alpha) = (1.5f32, 0.3);
-    let enter = Lobe::GgxTransmission(GgxTransmission {
-        alpha,
-        eta,
-        fresnel: Fresnel::Dielectric { eta },
-        tint: Vec3::ONE,
-    });
+    let enter =
+        Lobe::GgxTransmission(GgxTransmission { alpha, eta, fresnel: Fresnel::Dielectric { eta }, tint: Vec3::ONE });
     let leave = Lobe::GgxTransmission(GgxTransmission {
         alpha,
         eta: 1.0 / eta,

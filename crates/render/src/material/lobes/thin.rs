@@ -19,11 +19,7 @@ pub(crate) struct ThinTransmission {
 
 impl ThinTransmission {
     fn mirrored(&self) -> GgxReflection {
-        GgxReflection {
-            alpha: self.alpha,
-            fresnel: Fresnel::Constant(Vec3::ONE),
-            masking: Masking::Correlated,
-        }
+        GgxReflection { alpha: self.alpha, fresnel: Fresnel::Constant(Vec3::ONE), masking: Masking::Correlated }
     }
 
     /// What goes through when `up` is the mirror image of where the light comes from.
