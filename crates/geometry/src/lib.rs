@@ -17,6 +17,7 @@ mod aabb;
 pub mod error;
 pub mod offset;
 mod precision;
+pub mod quadratic;
 mod ray;
 mod real;
 pub mod shapes;

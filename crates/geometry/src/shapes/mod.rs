@@ -1,5 +1,15 @@
 //! Analytic primitives, one file a shape.
 //!
+//! | shape | kind in scene files | surface parameters (u, v) |
+//! |---|---|---|
+//! | [`Sphere`] | `sphere` | longitude and latitude, 0..1 |
+//! | [`Plane`] | `plane` | coordinates in the plane, world units |
+//! | [`Disk`] | `disk` | angle and distance from the inner rim, 0..1 |
+//! | [`Polygon`] | `polygon` | the two kept coordinates across its bounds, 0..1 |
+//! | [`Cuboid`] | `box` | the other two coordinates across the face, 0..1 |
+//! | [`Quadric`], open | `quadric`, `cylinder`, `cone`, ... | longitude, 0..1; height |
+//! | [`Solid`], closed | as the quadric it closes | as the quadric; on a cap as the box |
+//!
 //! To add one: a file here, a variant of [`Shape`], its cases in `tests/corpus`; the property suite picks it up.
 
 use crate::{Aabb, Ray, Real};
@@ -35,6 +45,21 @@ pub trait Primitive<R: Real> {
     fn any_hit(&self, ray: &Ray<R>) -> bool {
         self.closest_hit(ray).is_some()
     }
+
+    /// A computed hit point brought back onto the surface, and a bound of the distance that is left.
+    ///
+    /// `normal` is the normal of the hit; it tells which face of a box or cap of a solid was hit. The point must lie
+    /// near the surface, as `ray.at(hit.t)` does.
+    ///
+    /// The bound covers the rounding of the point itself *and* that of the next intersection test from there: a ray
+    /// that starts at `point + normal * error` and leaves to that side does not hit the same piece of surface again.
+    fn refine(&self, point: R::Vec3, normal: Option<R::Vec3>) -> (R::Vec3, R);
+
+    /// Whether a straight line meets the primitive at most once, so that a ray that starts on it need not be tested
+    /// against it.
+    fn is_flat(&self) -> bool {
+        false
+    }
 }
 
 /// Why a shape cannot be made.
@@ -59,12 +84,35 @@ pub enum ShapeError {
         /// What was given.
         value: f64,
     },
+    /// The vertices of a polygon do not lie in one plane.
+    #[error("polygon is not flat: a vertex lies {distance} off its plane, {tolerance} is allowed")]
+    NotPlanar {
+        /// Distance of the worst vertex from the plane, in world units.
+        distance: f64,
+        /// The largest distance allowed.
+        tolerance: f64,
+    },
     /// The parameters describe no surface.
     #[error("degenerate shape: {0}")]
     Degenerate(&'static str),
 }
 
+mod common;
+mod cuboid;
+mod disk;
+mod plane;
+mod polygon;
+mod quadric;
+mod quadric_bounds;
+mod solid;
 mod sphere;
+
+pub use cuboid::Cuboid;
+pub use disk::Disk;
+pub use plane::Plane;
+pub use polygon::Polygon;
+pub use quadric::{Quadric, QuadricKind};
+pub use solid::Solid;
 pub use sphere::Sphere;
 
 /// Any of the analytic shapes.
@@ -73,6 +121,18 @@ pub use sphere::Sphere;
 pub enum Shape<R: Real> {
     /// A sphere.
     Sphere(Sphere<R>),
+    /// An infinite plane.
+    Plane(Plane<R>),
+    /// A disk or annulus.
+    Disk(Disk<R>),
+    /// A flat polygon with holes.
+    Polygon(Polygon<R>),
+    /// An axis-aligned box.
+    Cuboid(Cuboid<R>),
+    /// An open quadric surface.
+    Quadric(Quadric<R>),
+    /// A quadric closed by the faces of its clip box.
+    Solid(Solid<R>),
 }
 
 impl<R: Real> Shape<R> {
@@ -80,6 +140,12 @@ impl<R: Real> Shape<R> {
     fn primitive(&self) -> &dyn Primitive<R> {
         match self {
             Self::Sphere(s) => s,
+            Self::Plane(s) => s,
+            Self::Disk(s) => s,
+            Self::Polygon(s) => s,
+            Self::Cuboid(s) => s,
+            Self::Quadric(s) => s,
+            Self::Solid(s) => s,
         }
     }
 
@@ -88,7 +154,29 @@ impl<R: Real> Shape<R> {
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Sphere(_) => "sphere",
+            Self::Plane(_) => "plane",
+            Self::Disk(_) => "disk",
+            Self::Polygon(_) => "polygon",
+            Self::Cuboid(_) => "box",
+            Self::Quadric(q) => q.kind().name(),
+            Self::Solid(s) => s.surface().kind().name(),
         }
+    }
+
+    /// The same shape in another arithmetic, its parameters rounded to nearest.
+    ///
+    /// # Errors
+    /// When rounding leaves no shape, e.g. a radius too small for f32.
+    pub fn cast<S: Real>(&self) -> Result<Shape<S>, ShapeError> {
+        Ok(match self {
+            Self::Sphere(s) => Shape::Sphere(s.cast()?),
+            Self::Plane(s) => Shape::Plane(s.cast()?),
+            Self::Disk(s) => Shape::Disk(s.cast()?),
+            Self::Polygon(s) => Shape::Polygon(s.cast()?),
+            Self::Cuboid(s) => Shape::Cuboid(s.cast()?),
+            Self::Quadric(s) => Shape::Quadric(s.cast()?),
+            Self::Solid(s) => Shape::Solid(s.cast()?),
+        })
     }
 }
 
@@ -105,4 +193,21 @@ impl<R: Real> Primitive<R> for Shape<R> {
     fn any_hit(&self, ray: &Ray<R>) -> bool {
         self.primitive().any_hit(ray)
     }
+    fn refine(&self, point: R::Vec3, normal: Option<R::Vec3>) -> (R::Vec3, R) {
+        self.primitive().refine(point, normal)
+    }
+    fn is_flat(&self) -> bool {
+        self.primitive().is_flat()
+    }
 }
+
+macro_rules! shape_from {
+    ($($shape:ident),*) => {
+        $(impl<R: Real> From<$shape<R>> for Shape<R> {
+            fn from(shape: $shape<R>) -> Self {
+                Self::$shape(shape)
+            }
+        })*
+    };
+}
+shape_from!(Sphere, Plane, Disk, Polygon, Cuboid, Quadric, Solid);
