@@ -82,15 +82,15 @@ impl Environment {
             return Err(EnvironmentError { width, height, pixels: pixels.len() });
         }
         let map = Map::new(width as usize, height as usize, pixels);
-        Ok(Self { source: Source::Map(Arc::new(map)), turn: (rotation / TAU).rem_euclid(1.0), scale })
+        Ok(Self { source: Source::Map(Arc::new(map)), turn: turn(rotation), scale })
     }
 
-    /// The built-in photo studio, turned counter-clockwise seen from +Y by `rotation` radians.
+    /// The built-in photo studio, turned counter-clockwise seen from +Y by `rotation` radians and multiplied by `scale`.
     #[must_use]
-    pub fn studio(rotation: f32) -> Self {
+    pub fn studio(rotation: f32, scale: Vec3) -> Self {
         let (width, height, pixels) = studio::bake();
         let map = Map::new(width, height, pixels);
-        Self { source: Source::Map(Arc::new(map)), turn: (rotation / TAU).rem_euclid(1.0), scale: Vec3::ONE }
+        Self { source: Source::Map(Arc::new(map)), turn: turn(rotation), scale }
     }
 
     /// Whether no light comes from anywhere.
@@ -155,6 +155,11 @@ impl Environment {
         // By atan2, since acos loses half of its digits near the poles.
         [u, d.x.hypot(d.z).atan2(d.y) / PI]
     }
+}
+
+/// A rotation in turns, in [0, 1]; 0 for what is not finite.
+fn turn(rotation: f32) -> f32 {
+    if rotation.is_finite() { (rotation / TAU).rem_euclid(1.0) } else { 0.0 }
 }
 
 /// The unit direction of a point of the map.

@@ -17,22 +17,6 @@ pub(super) enum Layers {
     Only(Aov),
 }
 
-/// The name of an AOV's layer.
-pub(super) const fn layer_name(aov: Aov) -> &'static str {
-    match aov {
-        Aov::Depth => "depth",
-        Aov::Normal => "normal",
-        Aov::GeometricNormal => "geometric_normal",
-        Aov::Albedo => "albedo",
-        Aov::Uv => "uv",
-        Aov::Barycentric => "barycentric",
-        Aov::InstanceId => "instance",
-        Aov::MaterialId => "material",
-        Aov::PrimitiveId => "primitive",
-        Aov::Heat => "heat",
-    }
-}
-
 /// The channels of an AOV's layer.
 const fn channel_names(aov: Aov) -> &'static [&'static str] {
     match aov {
@@ -57,7 +41,7 @@ pub(super) fn write(out: &mut impl Write, film: &Film, layers: Layers) -> io::Re
     }
     for aov in film.aovs() {
         if let (true, Some(picture)) = (matches!(layers, Layers::All) || layers == Layers::Only(*aov), film.aov(*aov)) {
-            add(&picture, &format!("{}.", layer_name(*aov)), channel_names(*aov));
+            add(&picture, &format!("{}.", aov.name()), channel_names(*aov));
         }
     }
 

@@ -110,7 +110,7 @@ pub fn write_film(path: &Path, film: &Film, options: &WriteOptions) -> Result<Ve
     .map_err(failed(path))?;
     if format != Format::Exr {
         for aov in film.aovs() {
-            let beside = path.with_extension(format!("{}.exr", exr::layer_name(*aov)));
+            let beside = path.with_extension(format!("{}.exr", aov.name()));
             atomically(&beside, |out| exr::write(out, film, exr::Layers::Only(*aov))).map_err(failed(&beside))?;
             written.push(beside);
         }
