@@ -14,7 +14,10 @@
 #![forbid(unsafe_code)]
 
 mod aabb;
+pub mod clip;
+pub mod distance;
 pub mod error;
+pub mod frustum;
 pub mod offset;
 mod precision;
 pub mod quadratic;

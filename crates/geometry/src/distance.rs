@@ -1,0 +1,168 @@
+//! Closest points: on a segment, a box, a triangle.
+
+use crate::{Aabb, Real, Vector3};
+
+/// The nearest point of a primitive, and where on it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ClosestPoint<R: Real> {
+    /// The point itself.
+    pub point: R::Vec3,
+    /// Its weights: of the segment's two ends (the third is 0), or of the triangle's vertices 0, 1 and 2. They are
+    /// not negative and sum to 1.
+    pub weights: [R; 3],
+}
+
+/// The point of the segment from `a` to `b` nearest to `p`. The ends may coincide.
+///
+/// Error: some `u` times the largest distance between the three points.
+#[must_use]
+pub fn closest_on_segment<R: Real>(a: R::Vec3, b: R::Vec3, p: R::Vec3) -> ClosestPoint<R> {
+    let (ab, ap) = (b - a, p - a);
+    // Scaled, so that the squares neither overflow nor vanish; a segment without length gives 0/0 and is cut to 0.
+    let k = R::ONE / ab.abs().max_element().power_of_two_below();
+    let e = ab * k;
+    let t = (ap * k).dot(e) / e.dot(e);
+    let t = if t > R::ZERO { t.min(R::ONE) } else { R::ZERO };
+    // From the nearer end: at the end itself the result is that end, bit for bit.
+    let point = if t <= R::HALF { a + ab * t } else { b - ab * (R::ONE - t) };
+    ClosestPoint { point, weights: [R::ONE - t, t, R::ZERO] }
+}
+
+/// The point of a closed box nearest to `p`: `p` itself if it is inside. Exact. An empty box gives its lower corner's
+/// coordinates where it is inverted.
+#[must_use]
+pub fn closest_on_box<R: Real>(bounds: &Aabb<R>, p: R::Vec3) -> R::Vec3 {
+    p.min(bounds.max).max(bounds.min)
+}
+
+/// The point of a triangle nearest to `p`. Triangles without area are the segment or point that they are.
+///
+/// The perpendicular foot where it falls inside, else the best of the three edges (the regions of Ericson, *Real-Time
+/// Collision Detection*, section 5.1.5, without its divisions by areas that may vanish). Error: some `u` times the
+/// largest distance between the four points, divided by the sine of the smallest angle for the foot.
+///
+/// ```
+/// use firsthit_geometry::distance::closest_on_triangle;
+/// use glam::DVec3;
+/// let nearest = closest_on_triangle::<f64>([DVec3::ZERO, DVec3::X, DVec3::Y], DVec3::new(0.25, 0.25, 3.0));
+/// assert_eq!(nearest.point, DVec3::new(0.25, 0.25, 0.0));
+/// assert_eq!(nearest.weights, [0.5, 0.25, 0.25]);
+/// ```
+#[must_use]
+pub fn closest_on_triangle<R: Real>([a, b, c]: [R::Vec3; 3], p: R::Vec3) -> ClosestPoint<R> {
+    let (ab, ac) = (b - a, c - a);
+    let k = R::ONE / ab.abs().max(ac.abs()).max_element().power_of_two_below();
+    let (e, f, q) = (ab * k, ac * k, (p - a) * k);
+    let n = e.cross(f);
+    let area = n.dot(n);
+    let (v, w) = (n.dot(q.cross(f)) / area, n.dot(e.cross(q)) / area);
+    if v >= R::ZERO && w >= R::ZERO && v + w <= R::ONE {
+        return ClosestPoint { point: a + ab * v + ac * w, weights: [R::ONE - v - w, v, w] };
+    }
+    let edge = |from: R::Vec3, to: R::Vec3, order: [usize; 3]| {
+        let on_edge = closest_on_segment::<R>(from, to, p);
+        let mut weights = [R::ZERO; 3];
+        for (i, weight) in order.into_iter().zip(on_edge.weights) {
+            weights[i] = weight;
+        }
+        (squared_distance::<R>(on_edge.point, p), ClosestPoint { weights, ..on_edge })
+    };
+    let first = edge(a, b, [0, 1, 2]);
+    [edge(b, c, [1, 2, 0]), edge(c, a, [2, 0, 1])]
+        .into_iter()
+        .fold(first, |best, other| if other.0 < best.0 { other } else { best })
+        .1
+}
+
+/// Distance of a point from a triangle, in world units.
+#[must_use]
+pub fn distance_to_triangle<R: Real>(vertices: [R::Vec3; 3], p: R::Vec3) -> R {
+    let d = closest_on_triangle::<R>(vertices, p).point - p;
+    // Scaled against overflow of the squares.
+    let k = d.abs().max_element().power_of_two_below();
+    (d * (R::ONE / k)).length() * k
+}
+
+fn squared_distance<R: Real>(a: R::Vec3, b: R::Vec3) -> R {
+    let d = a - b;
+    d.dot(d)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{DVec3, Vec3};
+    use proptest::prelude::*;
+
+    #[test]
+    fn degenerate_input() {
+        let p = DVec3::new(1.0, 2.0, 3.0);
+        assert_eq!(closest_on_segment::<f64>(p, p, DVec3::ZERO).point, p);
+        assert_eq!(closest_on_triangle::<f64>([p; 3], DVec3::ZERO).point, p);
+        let line = [DVec3::ZERO, DVec3::X * 2.0, DVec3::X];
+        assert_eq!(closest_on_triangle::<f64>(line, DVec3::new(1.5, 1.0, 0.0)).point, DVec3::X * 1.5);
+        let tiny = [Vec3::ZERO, Vec3::X * 1e-38, Vec3::Y * 1e-38];
+        assert_eq!(closest_on_triangle::<f32>(tiny, Vec3::X).point, Vec3::X * 1e-38);
+    }
+
+    #[test]
+    fn every_region_of_a_triangle() {
+        let t = [DVec3::ZERO, DVec3::X * 4.0, DVec3::Y * 4.0];
+        let cases = [
+            (DVec3::new(1.0, 1.0, -2.0), DVec3::new(1.0, 1.0, 0.0)),
+            (DVec3::new(-1.0, -1.0, 1.0), DVec3::ZERO),
+            (DVec3::new(6.0, -1.0, 1.0), DVec3::X * 4.0),
+            (DVec3::new(-1.0, 7.0, 1.0), DVec3::Y * 4.0),
+            (DVec3::new(2.0, -1.0, 1.0), DVec3::X * 2.0),
+            (DVec3::new(-3.0, 1.0, 1.0), DVec3::Y),
+            (DVec3::new(4.0, 4.0, 5.0), DVec3::new(2.0, 2.0, 0.0)),
+        ];
+        for (p, expected) in cases {
+            assert_eq!(closest_on_triangle::<f64>(t, p).point, expected, "{p}");
+        }
+        assert_eq!(distance_to_triangle::<f64>(t, DVec3::new(1.0, 1.0, -2.0)), 2.0);
+    }
+
+    #[test]
+    fn box_clamps() {
+        let b = Aabb::<f32>::new(Vec3::ZERO, Vec3::ONE);
+        assert_eq!(closest_on_box(&b, Vec3::new(2.0, 0.5, -1.0)), Vec3::new(1.0, 0.5, 0.0));
+        assert_eq!(closest_on_box(&b, Vec3::splat(0.25)), Vec3::splat(0.25));
+    }
+
+    fn point() -> impl Strategy<Value = DVec3> {
+        (-2.0..2.0_f64, -2.0..2.0_f64, -2.0..2.0_f64).prop_map(|(x, y, z)| DVec3::new(x, y, z))
+    }
+
+    proptest! {
+        /// No sampled point of the triangle is nearer, the weights give the point, and f32 agrees with f64.
+        #[test]
+        fn nothing_is_nearer(v in [point(), point(), point()], p in point()) {
+            let nearest = closest_on_triangle::<f64>(v, p);
+            let distance = distance_to_triangle::<f64>(v, p);
+            let weighted = v[0] * nearest.weights[0] + v[1] * nearest.weights[1] + v[2] * nearest.weights[2];
+            prop_assert!(weighted.distance(nearest.point) < 1e-12);
+            prop_assert!(nearest.weights.iter().all(|&w| w >= -1e-15));
+            for i in 0..=32 {
+                for j in 0..=32 - i {
+                    let (a, b) = (f64::from(i) / 32.0, f64::from(j) / 32.0);
+                    let q = v[0] + (v[1] - v[0]) * a + (v[2] - v[0]) * b;
+                    prop_assert!(q.distance(p) >= distance - 1e-12);
+                }
+            }
+            let v32 = v.map(|x| x.as_vec3());
+            let exact = distance_to_triangle::<f64>(v32.map(|x| x.as_dvec3()), p.as_vec3().as_dvec3());
+            let got = f64::from(distance_to_triangle::<f32>(v32, p.as_vec3()));
+            prop_assert!((got - exact).abs() < 1e-4, "{got} {exact}");
+        }
+
+        #[test]
+        fn power_of_two_scaling_is_exact(v in [point(), point(), point()], p in point(), e in -60..60_i32) {
+            let s = 2.0_f64.powi(e);
+            let small = closest_on_triangle::<f64>(v, p);
+            let scaled = closest_on_triangle::<f64>(v.map(|x| x * s), p * s);
+            prop_assert_eq!(small.point * s, scaled.point);
+            prop_assert_eq!(small.weights, scaled.weights);
+        }
+    }
+}
