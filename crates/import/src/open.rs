@@ -127,7 +127,8 @@ pub(crate) fn read_as(
     including: &[PathBuf],
 ) -> Result<Imported, ImportError> {
     match format {
-        Format::Obj | Format::Gltf => Err(ImportError::unsupported(file, "", "this format is not read yet")),
+        Format::Obj => crate::obj::read(file, options),
+        Format::Gltf => Err(ImportError::unsupported(file, "", "this format is not read yet")),
         Format::Scene => toml::read_included(file, options, including),
     }
 }
