@@ -1,0 +1,299 @@
+//! The command line, once: parsing, `--help`, completions, the manual page and the keys of the configuration file
+//! all come from these definitions.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+use firsthit_geometry::Precision;
+use firsthit_import::UpAxis;
+use firsthit_render::{CameraChoice, Crop, EffectOverrides, IntegratorChoice, ViewTransform};
+use glam::DVec3;
+
+use crate::values::{self, AovList, Color, Hdri, Plane, Resolution};
+
+const EXAMPLES: &str = "\
+Examples:
+  firsthit render helmet.glb                        writes helmet.png
+  firsthit render scan.obj --up +Z -o scan.exr --aov depth,normal
+  firsthit render chair.glb --camera-azimuth-angle 40 --resolution 1920x1080 --spp 64
+  firsthit inspect helmet.glb --json                what is in the file
+  firsthit completions bash > /etc/bash_completion.d/firsthit
+
+Exit codes: 0 done, 1 loading or rendering failed, 2 wrong usage, 130 interrupted.";
+
+const RENDER_EXAMPLES: &str = "\
+Examples:
+  firsthit render helmet.glb
+      Frame the model, light it with the studio and write helmet.png.
+  firsthit render room.glb --camera 0 -s 256 -t 2 -o room.exr
+      The file's first camera, 256 samples per pixel on two threads, as OpenEXR.
+  firsthit render engine.obj --up +Z --clip-plane 1,0,0,0
+      A section view: only what lies at x <= 0 is shown.
+  firsthit render car.glb --hdri sunset.hdr --hdri-rotation 90 --exposure -0.5
+      Lit by an environment map, half a stop darker.
+  firsthit render car.glb --effects auto,-shadows,+ao
+      What the scene calls for, without shadows and with ambient occlusion.
+  firsthit render car.glb -o - | display -
+      PNG on standard output.
+
+A `firsthit.toml` in the current folder (or the file of --config) may set any long option by its name, for example
+  resolution = \"1920x1080\"
+  spp = 64
+  camera-position = [3, 1, 4]
+The command line wins over it. Paths in it are relative to the current folder.
+
+Exit codes: 0 done, 1 loading or rendering failed, 2 wrong usage, 130 interrupted (the image so far is written).";
+
+const INSPECT_EXAMPLES: &str = "\
+Examples:
+  firsthit inspect helmet.glb
+  firsthit inspect helmet.glb --json | jq .triangles";
+
+/// Renders models: one command from an OBJ, glTF or scene file to an image.
+#[derive(Debug, Parser)]
+#[command(name = "firsthit", version, max_term_width = 110, after_help = EXAMPLES, arg_required_else_help = true)]
+pub(crate) struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Render a model to an image.
+    Render(Box<RenderArgs>),
+    /// Say what is in a model: triangles, materials, cameras, extensions, effects, quality.
+    Inspect(InspectArgs),
+    /// Print a script that completes this program's options in a shell.
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+    /// Print a manual page (roff).
+    Man {
+        /// The page of one command instead of the program's.
+        #[arg(value_parser = ["render", "inspect", "completions"])]
+        command: Option<String>,
+    },
+}
+
+#[derive(Args, Debug)]
+#[command(args_override_self = true, after_help = RENDER_EXAMPLES, next_line_help = false)]
+pub(crate) struct RenderArgs {
+    /// The model or scene: .obj, .obj.zst, .gltf, .glb, .toml, .json
+    #[arg(value_name = "MODEL")]
+    pub(crate) model: PathBuf,
+
+    #[command(flatten)]
+    pub(crate) output: OutputArgs,
+    #[command(flatten)]
+    pub(crate) quality: QualityArgs,
+    #[command(flatten)]
+    pub(crate) camera: CameraArgs,
+    #[command(flatten)]
+    pub(crate) scene: SceneArgs,
+    #[command(flatten)]
+    pub(crate) run: RunArgs,
+}
+
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Image")]
+pub(crate) struct OutputArgs {
+    /// Where to write: .png, .exr or .hdr; `-` is PNG on standard output [default: the model's name with .png]
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
+
+    /// Width and height in pixels, as 1280x720 or 1280,720 [default: the scene file's, else 1280x720]
+    #[arg(long, value_name = "WxH", value_parser = values::resolution)]
+    pub(crate) resolution: Option<Resolution>,
+
+    /// Render only this window, in pixels from the upper left; the image has the window's size
+    #[arg(long, value_name = "X,Y,W,H", value_parser = values::crop)]
+    pub(crate) crop: Option<Crop>,
+
+    /// Brighten a PNG by this many stops, darken it if negative; .exr and .hdr keep the scene's radiance
+    #[arg(long, value_name = "EV", default_value = "0", value_parser = values::number, allow_hyphen_values = true)]
+    pub(crate) exposure: f64,
+
+    /// How radiance becomes the colours of a PNG: pbr-neutral, agx, srgb or none (linear)
+    #[arg(long, value_name = "NAME", default_value = "pbr-neutral", value_parser = values::tone_mapping)]
+    pub(crate) tone_mapping: ViewTransform,
+
+    /// Bits per channel of a PNG
+    #[arg(long, value_name = "8|16", default_value = "8", value_parser = values::bit_depth)]
+    pub(crate) bit_depth: u8,
+
+    /// Pictures beside the colour, comma-separated: layers of an .exr, else files NAME.depth.exr and so on
+    #[arg(long, value_name = "LIST", value_parser = values::aovs)]
+    pub(crate) aov: Option<AovList>,
+}
+
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Quality")]
+pub(crate) struct QualityArgs {
+    /// Samples per pixel
+    #[arg(short, long, visible_alias = "samples", value_name = "N", default_value = "16",
+          value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) spp: u32,
+
+    /// Most bounces of a path; 1 is direct light [default: the scene file's, else 8]
+    #[arg(long, value_name = "N")]
+    pub(crate) max_depth: Option<u32>,
+
+    /// Seed of the samples: the same seed gives the same bits, with any number of threads
+    #[arg(long, value_name = "N", default_value = "0")]
+    pub(crate) seed: u64,
+
+    /// How light is computed: auto, whitted, direct, ao, or the name of an --aov as the picture
+    #[arg(long, value_name = "NAME", default_value = "auto", value_parser = values::integrator)]
+    pub(crate) integrator: IntegratorChoice,
+
+    /// `auto`: what the scene calls for; `auto,-shadows,+ao` changes that; a plain list replaces it; `none`
+    #[arg(long, value_name = "LIST", default_value = "auto", value_parser = values::effects, allow_hyphen_values = true)]
+    pub(crate) effects: EffectOverrides,
+
+    /// How carefully rays meet surfaces: fast, robust (no leaks) or double
+    #[arg(long, value_name = "TIER", default_value = "robust")]
+    pub(crate) precision: Precision,
+}
+
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Camera")]
+pub(crate) struct CameraArgs {
+    /// A camera of the file by name or by number from 0; `auto` frames the model
+    #[arg(long, value_name = "NAME|INDEX|auto", default_value = "auto", value_parser = values::camera)]
+    pub(crate) camera: CameraChoice,
+
+    /// Where the camera stands, in world units
+    #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true)]
+    pub(crate) camera_position: Option<DVec3>,
+
+    /// The point it looks at, in world units
+    #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true)]
+    pub(crate) camera_focal_point: Option<DVec3>,
+
+    /// Its upward direction
+    #[arg(long, value_name = "X,Y,Z", value_parser = values::direction, allow_hyphen_values = true)]
+    pub(crate) camera_view_up: Option<DVec3>,
+
+    /// Its full vertical angle of view, in degrees
+    #[arg(long, value_name = "DEG", value_parser = values::view_angle)]
+    pub(crate) camera_view_angle: Option<f64>,
+
+    /// Turn it around the focal point, counter-clockwise seen from above
+    #[arg(long, value_name = "DEG", default_value = "0", value_parser = values::number, allow_hyphen_values = true)]
+    pub(crate) camera_azimuth_angle: f64,
+
+    /// Turn it around the focal point, upwards
+    #[arg(long, value_name = "DEG", default_value = "0", value_parser = values::number, allow_hyphen_values = true)]
+    pub(crate) camera_elevation_angle: f64,
+
+    /// Above 1: closer
+    #[arg(long, value_name = "F", value_parser = values::positive)]
+    pub(crate) camera_zoom_factor: Option<f64>,
+
+    /// Parallel projection
+    #[arg(long)]
+    pub(crate) camera_orthographic: bool,
+}
+
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Scene")]
+pub(crate) struct SceneArgs {
+    /// The file's upward axis: +X, -X, +Y, -Y, +Z or -Z [default: what the format says, else +Y]
+    #[arg(long, value_name = "AXIS", value_parser = values::up_axis, allow_hyphen_values = true)]
+    pub(crate) up: Option<UpAxis>,
+
+    /// Light from around: an image by longitude and latitude (.hdr, .exr), or studio, white, black
+    /// [default: the scene's, else the studio where there is no light]
+    #[arg(long, value_name = "FILE|studio|white|black", value_parser = values::hdri)]
+    pub(crate) hdri: Option<Hdri>,
+
+    /// Turn it counter-clockwise, seen from +Y
+    #[arg(long, value_name = "DEG", default_value = "0", value_parser = values::number, allow_hyphen_values = true)]
+    pub(crate) hdri_rotation: f64,
+
+    /// One colour behind the model: sRGB from 0 to 1, or #rrggbb
+    #[arg(long, value_name = "R,G,B", value_parser = values::color, overrides_with = "no_background")]
+    pub(crate) background_color: Option<Color>,
+
+    /// Transparent where there is no surface
+    #[arg(long, overrides_with = "background_color")]
+    pub(crate) no_background: bool,
+
+    /// Show only what lies inside this box, in world units
+    #[arg(long, value_name = "X0,Y0,Z0,X1,Y1,Z1", value_parser = values::clip_box, allow_hyphen_values = true)]
+    pub(crate) clip_box: Option<(DVec3, DVec3)>,
+
+    /// Show only where NX x + NY y + NZ z <= D, in world units; may be given several times
+    #[arg(long, value_name = "NX,NY,NZ,D", value_parser = values::plane, allow_hyphen_values = true, action = clap::ArgAction::Append)]
+    pub(crate) clip_plane: Vec<Plane>,
+}
+
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Program")]
+pub(crate) struct RunArgs {
+    /// Threads to render with [default: one per core]
+    #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub(crate) threads: Option<u16>,
+
+    /// Read options from this file [default: firsthit.toml in the current folder, if there]
+    #[arg(long, value_name = "FILE", overrides_with = "no_config")]
+    pub(crate) config: Option<PathBuf>,
+
+    /// Read no configuration file
+    #[arg(long, overrides_with = "config")]
+    pub(crate) no_config: bool,
+
+    /// Take every warning about the model as an error
+    #[arg(long)]
+    pub(crate) strict: bool,
+
+    /// Say what was chosen and why, and what each effect cost
+    #[arg(long)]
+    pub(crate) explain: bool,
+
+    /// Print a report of the render as JSON on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
+
+    /// Show progress, also where standard error is no terminal
+    #[arg(long, overrides_with = "no_progress")]
+    pub(crate) progress: bool,
+
+    /// Show no progress
+    #[arg(long, overrides_with = "progress")]
+    pub(crate) no_progress: bool,
+
+    /// Print errors only
+    #[arg(short, long, overrides_with = "verbose")]
+    pub(crate) quiet: bool,
+
+    /// Print all warnings and what is being done
+    #[arg(short, long, overrides_with = "quiet")]
+    pub(crate) verbose: bool,
+}
+
+#[derive(Args, Debug)]
+#[command(args_override_self = true, after_help = INSPECT_EXAMPLES)]
+pub(crate) struct InspectArgs {
+    /// The model or scene: .obj, .obj.zst, .gltf, .glb, .toml, .json
+    #[arg(value_name = "MODEL")]
+    pub(crate) model: PathBuf,
+
+    /// Print JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+
+    /// The file's upward axis: +X, -X, +Y, -Y, +Z or -Z [default: what the format says, else +Y]
+    #[arg(long, value_name = "AXIS", value_parser = values::up_axis, allow_hyphen_values = true)]
+    pub(crate) up: Option<UpAxis>,
+
+    /// The tier of precision that the trees are built for: fast, robust or double
+    #[arg(long, value_name = "TIER", default_value = "robust")]
+    pub(crate) precision: Precision,
+
+    /// Take every warning about the model as an error
+    #[arg(long)]
+    pub(crate) strict: bool,
+}

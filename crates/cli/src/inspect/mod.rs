@@ -1,0 +1,277 @@
+//! `firsthit inspect`: what is in a model, without rendering it.
+
+mod text;
+
+use std::time::Instant;
+
+use firsthit_accel::{BuildOptions, Scene, SceneBuilder};
+use firsthit_import::scene::{AlphaMode, LightKind, MaterialModel, MeshDesc, PbrMaterial, Projection, SurfaceDesc};
+use firsthit_import::{Imported, Report, SceneDesc};
+use serde::Serialize;
+
+use crate::args::InspectArgs;
+use crate::console::{Console, print, print_json};
+use crate::error::Failure;
+use crate::report::warnings;
+
+/// Looks at a model and prints what is in it.
+pub(crate) fn run(args: &InspectArgs) -> Result<(), Failure> {
+    let started = Instant::now();
+    let options = firsthit_import::Options { up: args.up, ..Default::default() };
+    let Imported { scene, report } = firsthit_import::open(&args.model, &options)?;
+    // Warnings are part of the result; here they only decide whether there is one.
+    Console::Quiet.warnings(&report, args.strict)?;
+    let load = started.elapsed().as_secs_f64();
+
+    let started = Instant::now();
+    let options = BuildOptions { precision: args.precision, ..Default::default() };
+    let trees = SceneBuilder::from_desc(&scene, options).build().map_err(|e| at_model(args, &e))?;
+    let build = started.elapsed().as_secs_f64();
+
+    let model = args.model.display().to_string();
+    let seconds = Seconds { load, build };
+    let inspection = Inspection::new(model, &scene, &report, &trees, seconds);
+    if args.json { print_json(&inspection) } else { print(inspection.to_string().as_bytes()) }
+}
+
+fn at_model(args: &InspectArgs, error: &dyn std::error::Error) -> Failure {
+    Failure::failed(format_args!("{}: {error}", args.model.display()))
+}
+
+/// The JSON of `inspect --json`. What is named like a count is a number; the lists stand beside it.
+#[derive(Serialize)]
+struct Inspection<'a> {
+    model: String,
+    /// Of the scene that is rendered: each instance counted.
+    triangles: u64,
+    /// Of every node of every scene in the file.
+    triangles_all_scenes: u64,
+    /// Each mesh counted once.
+    stored_triangles: u64,
+    /// Analytic shapes, each instance counted.
+    shapes: u64,
+    meshes: usize,
+    instances: usize,
+    materials: usize,
+    textures: usize,
+    lights: usize,
+    cameras: usize,
+    animations: u64,
+    /// Of what has an end, in world units.
+    bounds: Option<Bounds>,
+    mesh_list: Vec<Mesh<'a>>,
+    material_list: Vec<Material<'a>>,
+    texture_list: Vec<Texture<'a>>,
+    light_list: Vec<Named<'a>>,
+    camera_list: Vec<Named<'a>>,
+    extensions: Vec<Extension<'a>>,
+    bvh: Bvh,
+    warnings: Vec<String>,
+    /// Warnings beyond those listed.
+    more_warnings: u64,
+    seconds: Seconds,
+}
+
+#[derive(Serialize)]
+struct Bounds {
+    min: [f64; 3],
+    max: [f64; 3],
+}
+
+#[derive(Serialize)]
+struct Mesh<'a> {
+    name: &'a str,
+    geometries: usize,
+    /// How often it is placed.
+    instances: u64,
+    triangles: u64,
+    vertices: u64,
+    shapes: u64,
+}
+
+#[derive(Serialize)]
+struct Material<'a> {
+    name: &'a str,
+    kind: &'static str,
+    textures: usize,
+    double_sided: bool,
+    alpha: &'static str,
+}
+
+#[derive(Serialize)]
+struct Texture<'a> {
+    name: &'a str,
+    width: u32,
+    height: u32,
+}
+
+/// A light or camera: its kind beside its name.
+#[derive(Serialize)]
+struct Named<'a> {
+    name: &'a str,
+    kind: &'static str,
+}
+
+#[derive(Serialize)]
+struct Extension<'a> {
+    name: &'a str,
+    required: bool,
+    /// `full`, `partial`, `ignored` or `unsupported`.
+    support: &'static str,
+    note: &'a str,
+}
+
+/// Quality of the trees.
+#[derive(Serialize)]
+struct Bvh {
+    sah_cost: f64,
+    depth: u32,
+    bytes: u64,
+}
+
+#[derive(Serialize)]
+struct Seconds {
+    load: f64,
+    build: f64,
+}
+
+impl<'a> Inspection<'a> {
+    fn new(model: String, scene: &'a SceneDesc, report: &'a Report, trees: &Scene, seconds: Seconds) -> Self {
+        let mesh_list = meshes(scene);
+        let stats = trees.stats();
+        let bounds = trees.bounds();
+        let total = |count: fn(&Mesh<'_>) -> u64| mesh_list.iter().map(|m| count(m)).sum();
+        Self {
+            model,
+            triangles: total(|m| m.triangles * m.instances),
+            triangles_all_scenes: report.triangles_all_scenes,
+            stored_triangles: total(|m| m.triangles),
+            shapes: total(|m| m.shapes * m.instances),
+            meshes: scene.meshes.len(),
+            instances: scene.instances.len(),
+            materials: scene.materials.len(),
+            textures: scene.images.len(),
+            lights: scene.lights.len(),
+            cameras: scene.cameras.len(),
+            animations: report.animations,
+            bounds: bounds.is_finite().then(|| Bounds { min: bounds.min.to_array(), max: bounds.max.to_array() }),
+            material_list: scene.materials.iter().map(|m| material(&m.name, &m.model)).collect(),
+            texture_list: scene
+                .images
+                .iter()
+                .map(|i| Texture { name: &i.name, width: i.width, height: i.height })
+                .collect(),
+            light_list: scene.lights.iter().map(|l| Named { name: &l.name, kind: light_kind(&l.kind) }).collect(),
+            camera_list: scene
+                .cameras
+                .iter()
+                .map(|c| Named { name: &c.name, kind: projection_kind(&c.projection) })
+                .collect(),
+            extensions: report
+                .extensions
+                .iter()
+                .map(|e| Extension { name: &e.name, required: e.required, support: e.support.name(), note: e.note })
+                .collect(),
+            bvh: Bvh { sah_cost: stats.sah_cost, depth: stats.depth, bytes: stats.bytes },
+            warnings: warnings(report),
+            more_warnings: report.more_warnings,
+            seconds,
+            mesh_list,
+        }
+    }
+}
+
+fn meshes(scene: &SceneDesc) -> Vec<Mesh<'_>> {
+    let mut instances = vec![0; scene.meshes.len()];
+    for instance in &scene.instances {
+        instances[instance.mesh] += 1;
+    }
+    scene.meshes.iter().zip(instances).map(|(mesh, instances)| Mesh::new(mesh, instances)).collect()
+}
+
+impl<'a> Mesh<'a> {
+    fn new(mesh: &'a MeshDesc, instances: u64) -> Self {
+        // The geometries of a mesh differ in material, not in space: closed or not is said of them together.
+        let (mut positions, mut triangles, mut shapes) = (Vec::new(), Vec::new(), 0);
+        for geometry in &mesh.geometries {
+            match &geometry.surface {
+                SurfaceDesc::Triangles(m) => {
+                    let first = positions.len() as u32;
+                    positions.extend_from_slice(&m.positions);
+                    triangles.extend(m.triangles.iter().map(|t| t.map(|v| v + first)));
+                }
+                SurfaceDesc::Shape(_) => shapes += 1,
+            }
+        }
+        Self {
+            name: &mesh.name,
+            geometries: mesh.geometries.len(),
+            instances,
+            triangles: triangles.len() as u64,
+            vertices: positions.len() as u64,
+            shapes,
+        }
+    }
+}
+
+fn material<'a>(name: &'a str, model: &MaterialModel) -> Material<'a> {
+    let plain = |kind| Material { name, kind, textures: 0, double_sided: true, alpha: "opaque" };
+    match model {
+        MaterialModel::Pbr(pbr) => Material {
+            name,
+            kind: if pbr.unlit { "unlit" } else { "metallic-roughness" },
+            textures: texture_count(pbr),
+            double_sided: pbr.double_sided,
+            alpha: match pbr.alpha_mode {
+                AlphaMode::Opaque => "opaque",
+                AlphaMode::Mask { .. } => "mask",
+                AlphaMode::Blend => "blend",
+            },
+        },
+        MaterialModel::Diffuse { .. } => plain("diffuse"),
+        MaterialModel::Mirror { .. } => plain("mirror"),
+        MaterialModel::Glass { .. } => plain("glass"),
+        MaterialModel::RoughMirror { .. } => plain("rough mirror"),
+        MaterialModel::RoughGlass { .. } => plain("rough glass"),
+        MaterialModel::Emission { .. } => plain("emission"),
+    }
+}
+
+fn texture_count(pbr: &PbrMaterial) -> usize {
+    let all = [
+        &pbr.base_color_texture,
+        &pbr.opacity_texture,
+        &pbr.metallic_texture,
+        &pbr.roughness_texture,
+        &pbr.normal_texture,
+        &pbr.bump_texture,
+        &pbr.occlusion_texture,
+        &pbr.emissive_texture,
+        &pbr.transmission_texture,
+        &pbr.thickness_texture,
+        &pbr.specular_texture,
+        &pbr.specular_color_texture,
+    ];
+    // Metalness and roughness mostly share an image.
+    let mut images: Vec<usize> = all.into_iter().flatten().map(|t| t.image).collect();
+    images.sort_unstable();
+    images.dedup();
+    images.len()
+}
+
+fn light_kind(kind: &LightKind) -> &'static str {
+    match kind {
+        LightKind::Point { .. } => "point",
+        LightKind::Spot { .. } => "spot",
+        LightKind::Directional { .. } => "directional",
+        LightKind::Rectangle { .. } => "rectangle",
+        LightKind::Sphere { .. } => "sphere",
+    }
+}
+
+fn projection_kind(projection: &Projection) -> &'static str {
+    match projection {
+        Projection::Perspective { .. } => "perspective",
+        Projection::Orthographic { .. } => "orthographic",
+    }
+}

@@ -1,0 +1,126 @@
+//! The inspection as text.
+
+use std::fmt;
+
+use super::{Bounds, Inspection, Mesh};
+use crate::console::grouped;
+
+/// Entries of each list that are printed; JSON has all.
+const SHOWN: usize = 16;
+
+impl fmt::Display for Inspection<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}", self.model)?;
+        let row = |f: &mut fmt::Formatter<'_>, name: &str, value: String| writeln!(f, "  {name:11} {value}");
+
+        let mut triangles = grouped(self.triangles);
+        if self.stored_triangles != self.triangles {
+            triangles += &format!(", {} stored", grouped(self.stored_triangles));
+        }
+        if self.triangles_all_scenes != self.triangles {
+            triangles += &format!(", {} in all scenes", grouped(self.triangles_all_scenes));
+        }
+        row(f, "triangles", triangles)?;
+        if self.shapes > 0 {
+            row(f, "shapes", grouped(self.shapes))?;
+        }
+        row(f, "bounds", self.bounds.as_ref().map_or_else(|| "none".into(), Bounds::to_string))?;
+        row(f, "instances", grouped(self.instances as u64))?;
+        row(f, "meshes", grouped(self.meshes as u64))?;
+        list(f, &self.mesh_list, |m| (m.name, mesh(m)))?;
+        row(f, "materials", grouped(self.materials as u64))?;
+        list(f, &self.material_list, |m| {
+            let textures = match m.textures {
+                0 => String::new(),
+                1 => ", 1 texture".into(),
+                n => format!(", {n} textures"),
+            };
+            let alpha = if m.alpha == "opaque" { String::new() } else { format!(", alpha {}", m.alpha) };
+            (m.name, format!("{}{textures}{alpha}{}", m.kind, if m.double_sided { "" } else { ", single-sided" }))
+        })?;
+        row(f, "textures", grouped(self.textures as u64))?;
+        list(f, &self.texture_list, |t| (t.name, format!("{} x {}", t.width, t.height)))?;
+        row(f, "lights", grouped(self.lights as u64))?;
+        list(f, &self.light_list, |l| (l.name, l.kind.into()))?;
+        row(f, "cameras", grouped(self.cameras as u64))?;
+        list(f, &self.camera_list, |c| (c.name, c.kind.into()))?;
+        if self.animations > 0 {
+            row(f, "animations", format!("{} (not played)", self.animations))?;
+        }
+        row(f, "extensions", grouped(self.extensions.len() as u64))?;
+        list(f, &self.extensions, |e| {
+            let required = if e.required { "required, " } else { "" };
+            let note = if e.note.is_empty() { String::new() } else { format!(": {}", e.note) };
+            (e.name, format!("{required}{}{note}", e.support))
+        })?;
+        let bytes = grouped(self.bvh.bytes);
+        row(f, "tree", format!("SAH cost {:.1}, depth {}, {bytes} bytes", self.bvh.sah_cost, self.bvh.depth))?;
+        row(f, "warnings", grouped(self.warnings.len() as u64 + self.more_warnings))?;
+        for warning in self.warnings.iter().take(SHOWN) {
+            writeln!(f, "    {warning}")?;
+        }
+        more(f, self.warnings.len() as u64 + self.more_warnings)
+    }
+}
+
+/// Entries below a row: name and description.
+fn list<'a, T>(
+    f: &mut fmt::Formatter<'_>,
+    entries: &'a [T],
+    describe: impl Fn(&'a T) -> (&'a str, String),
+) -> fmt::Result {
+    let shown: Vec<_> = entries.iter().take(SHOWN).map(describe).collect();
+    let width = shown.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0).min(40);
+    for (name, description) in shown {
+        writeln!(f, "    {:width$}  {description}", if name.is_empty() { "-" } else { name })?;
+    }
+    more(f, entries.len() as u64)
+}
+
+fn more(f: &mut fmt::Formatter<'_>, count: u64) -> fmt::Result {
+    match count.saturating_sub(SHOWN as u64) {
+        0 => Ok(()),
+        n => writeln!(f, "    and {} more (--json lists all)", grouped(n)),
+    }
+}
+
+fn mesh(m: &Mesh<'_>) -> String {
+    let mut parts = Vec::new();
+    if m.triangles > 0 {
+        parts.push(format!("{} triangles", grouped(m.triangles)));
+    }
+    if m.shapes > 0 {
+        parts.push(format!("{} shapes", grouped(m.shapes)));
+    }
+    if m.instances != 1 {
+        parts.push(format!("{} instances", grouped(m.instances)));
+    }
+    parts.join(", ")
+}
+
+impl fmt::Display for Bounds {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let point = |p: [f64; 3]| format!("({})", p.map(significant).join(", "));
+        write!(f, "{} to {}", point(self.min), point(self.max))
+    }
+}
+
+/// Six significant digits: models are as small as 1e-6 and as far away as 1e7.
+fn significant(x: f64) -> String {
+    let size = if x == 0.0 { 0 } else { x.abs().log10().floor() as i32 };
+    match size {
+        -4..=5 => format!("{x:.*}", (5 - size) as usize),
+        _ => format!("{x:.5e}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bounds_keep_six_digits_at_any_scale() {
+        let texts = [0.0, 1.0, -12.3456789, 0.000123456789, 1e7, 1.23456789e-6].map(significant);
+        assert_eq!(texts, ["0.00000", "1.00000", "-12.3457", "0.000123457", "1.00000e7", "1.23457e-6"]);
+    }
+}

@@ -1,0 +1,42 @@
+//! Ctrl-C: once, and the image so far is written; twice, or while there is no image yet, and the program ends.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::SeqCst};
+
+use crate::console::message;
+use crate::error::Exit;
+
+/// Whether the user wants to stop.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Interrupt {
+    requested: Arc<AtomicBool>,
+    /// There is an image, or the beginning of one.
+    rendering: Arc<AtomicBool>,
+}
+
+impl Interrupt {
+    /// Listens for SIGINT, SIGTERM and SIGHUP (or their like) from now on.
+    pub(crate) fn listen() -> Self {
+        let interrupt = Self::default();
+        let heard = interrupt.clone();
+        // Without a handler Ctrl-C still ends the program: nothing to report.
+        let _ = ctrlc::set_handler(move || {
+            let again = heard.requested.swap(true, SeqCst);
+            if again || !heard.rendering.load(SeqCst) {
+                std::process::exit(Exit::Interrupted as i32);
+            }
+            message("\ninterrupted: writing the image so far (again: quit at once)");
+        });
+        interrupt
+    }
+
+    /// From now on the first Ctrl-C only asks to stop.
+    pub(crate) fn begin_rendering(&self) {
+        self.rendering.store(true, SeqCst);
+    }
+
+    /// Whether it was asked to stop.
+    pub(crate) fn requested(&self) -> bool {
+        self.requested.load(SeqCst)
+    }
+}

@@ -1,0 +1,310 @@
+//! The values of options, from text. Every error says what was expected.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use firsthit_import::UpAxis;
+use firsthit_render::{Aov, CameraChoice, Crop, EffectOverrides, EffectSet, IntegratorChoice, ViewTransform};
+use glam::{DVec3, Vec3};
+
+/// Most pixels of a picture: its film takes some 8 GB then.
+const MAX_PIXELS: u64 = 1 << 27;
+
+/// Width and height in pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Resolution {
+    pub(crate) width: u32,
+    pub(crate) height: u32,
+}
+
+/// What lights the scene from around.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Hdri {
+    Studio,
+    White,
+    Black,
+    File(PathBuf),
+}
+
+/// A half space: where `normal . p <= offset`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Plane {
+    pub(crate) normal: DVec3,
+    pub(crate) offset: f64,
+}
+
+/// A linear colour.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Color(pub(crate) Vec3);
+
+/// Pictures beside the colour, each once.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct AovList(pub(crate) Vec<Aov>);
+
+pub(crate) fn resolution(s: &str) -> Result<Resolution, String> {
+    let parsed = s.split_once(['x', 'X', ',']).and_then(|(w, h)| Some((whole(w)?, whole(h)?)));
+    let Some((width, height)) = parsed else { return Err("expected WIDTHxHEIGHT, as in 1280x720".into()) };
+    if width == 0 || height == 0 {
+        return Err("width and height must be at least 1".into());
+    }
+    if u64::from(width) * u64::from(height) > MAX_PIXELS {
+        return Err(format!("more than {MAX_PIXELS} pixels"));
+    }
+    Ok(Resolution { width, height })
+}
+
+pub(crate) fn crop(s: &str) -> Result<Crop, String> {
+    let parts: Option<Vec<u32>> = s.split(',').map(whole).collect();
+    match parts.as_deref() {
+        Some(&[_, _, 0, _] | &[_, _, _, 0]) => Err("width and height must be at least 1".into()),
+        Some(&[x, y, width, height]) => Ok(Crop { x, y, width, height }),
+        _ => Err("expected X,Y,WIDTH,HEIGHT in whole pixels".into()),
+    }
+}
+
+pub(crate) fn number(s: &str) -> Result<f64, String> {
+    finite(s).ok_or_else(|| "expected a number".into())
+}
+
+pub(crate) fn positive(s: &str) -> Result<f64, String> {
+    finite(s).filter(|&x| x > 0.0).ok_or_else(|| "expected a number above 0".into())
+}
+
+pub(crate) fn view_angle(s: &str) -> Result<f64, String> {
+    finite(s).filter(|&x| x > 0.0 && x < 180.0).ok_or_else(|| "expected degrees between 0 and 180".into())
+}
+
+pub(crate) fn bit_depth(s: &str) -> Result<u8, String> {
+    match s {
+        "8" => Ok(8),
+        "16" => Ok(16),
+        _ => Err("expected 8 or 16".into()),
+    }
+}
+
+pub(crate) fn vector(s: &str) -> Result<DVec3, String> {
+    let [x, y, z] = numbers(s).ok_or("expected three numbers, as in 1,-2.5,3")?;
+    Ok(DVec3::new(x, y, z))
+}
+
+pub(crate) fn direction(s: &str) -> Result<DVec3, String> {
+    vector(s)?.try_normalize().ok_or_else(|| "expected a direction that is not zero".into())
+}
+
+pub(crate) fn clip_box(s: &str) -> Result<(DVec3, DVec3), String> {
+    let [x0, y0, z0, x1, y1, z1] = numbers(s).ok_or("expected six numbers: X0,Y0,Z0,X1,Y1,Z1")?;
+    let (a, b) = (DVec3::new(x0, y0, z0), DVec3::new(x1, y1, z1));
+    Ok((a.min(b), a.max(b)))
+}
+
+pub(crate) fn plane(s: &str) -> Result<Plane, String> {
+    let [x, y, z, offset] = numbers(s).ok_or("expected four numbers: NX,NY,NZ,D")?;
+    let normal = DVec3::new(x, y, z);
+    if normal == DVec3::ZERO {
+        return Err("expected a normal that is not zero".into());
+    }
+    Ok(Plane { normal, offset })
+}
+
+pub(crate) fn color(s: &str) -> Result<Color, String> {
+    let rgb = match s.strip_prefix('#') {
+        Some(hex) if hex.len() == 6 && hex.bytes().all(|b| b.is_ascii_hexdigit()) => {
+            u32::from_str_radix(hex, 16).ok().map(|v| [v >> 16, v >> 8, v].map(|c| f64::from(c & 0xff) / 255.0))
+        }
+        Some(_) => None,
+        None => numbers(s),
+    };
+    rgb.filter(|rgb| rgb.iter().all(|c| (0.0..=1.0).contains(c)))
+        .map(|rgb| Color(Vec3::from_array(rgb.map(|c| srgb_to_linear(c) as f32))))
+        .ok_or_else(|| "expected three numbers from 0 to 1, or #rrggbb".into())
+}
+
+pub(crate) fn tone_mapping(s: &str) -> Result<ViewTransform, String> {
+    let found = ViewTransform::ALL.into_iter().find(|v| v.name() == s);
+    found.ok_or_else(|| format!("expected one of: {}", ViewTransform::ALL.map(ViewTransform::name).join(", ")))
+}
+
+pub(crate) fn camera(s: &str) -> Result<CameraChoice, String> {
+    Ok(if s == "auto" { CameraChoice::Auto } else { CameraChoice::Named(s.to_owned()) })
+}
+
+pub(crate) fn up_axis(s: &str) -> Result<UpAxis, String> {
+    Ok(match s.to_ascii_uppercase().as_str() {
+        "+X" | "X" => UpAxis::PosX,
+        "-X" => UpAxis::NegX,
+        "+Y" | "Y" => UpAxis::PosY,
+        "-Y" => UpAxis::NegY,
+        "+Z" | "Z" => UpAxis::PosZ,
+        "-Z" => UpAxis::NegZ,
+        _ => return Err("expected +X, -X, +Y, -Y, +Z or -Z".into()),
+    })
+}
+
+pub(crate) fn hdri(s: &str) -> Result<Hdri, String> {
+    Ok(match s {
+        "studio" => Hdri::Studio,
+        "white" => Hdri::White,
+        "black" => Hdri::Black,
+        "" => return Err("expected a file, or studio, white or black".into()),
+        file => Hdri::File(file.into()),
+    })
+}
+
+pub(crate) fn integrator(s: &str) -> Result<IntegratorChoice, String> {
+    Ok(match s {
+        "auto" => IntegratorChoice::Auto,
+        "whitted" => IntegratorChoice::Whitted,
+        "direct" => IntegratorChoice::Direct,
+        "ao" | "ambient-occlusion" => IntegratorChoice::AmbientOcclusion,
+        other => {
+            let aov = Aov::from_str(other)
+                .map_err(|_| format!("expected auto, whitted, direct, ao, or one of: {}", aov_names()))?;
+            IntegratorChoice::Aov(aov)
+        }
+    })
+}
+
+pub(crate) fn aovs(s: &str) -> Result<AovList, String> {
+    let mut list = Vec::new();
+    for name in s.split(',') {
+        let aov = Aov::from_str(name.trim()).map_err(|_| format!("unknown '{name}'; there are: {}", aov_names()))?;
+        if !list.contains(&aov) {
+            list.push(aov);
+        }
+    }
+    Ok(AovList(list))
+}
+
+/// `auto`, `auto,-shadows,+ao`, `shadows,textures`, `none`.
+pub(crate) fn effects(s: &str) -> Result<EffectOverrides, String> {
+    let mut overrides = EffectOverrides::default();
+    let mut auto = false;
+    for item in s.split(',').map(str::trim) {
+        if let Some(name) = item.strip_prefix('+') {
+            overrides.add |= effect(name)?;
+        } else if let Some(name) = item.strip_prefix('-') {
+            overrides.remove |= effect(name)?;
+        } else if item == "auto" {
+            auto = true;
+        } else {
+            let named = if item == "none" { EffectSet::empty() } else { effect(item)? };
+            overrides.only = Some(overrides.only.unwrap_or_default() | named);
+        }
+    }
+    if auto && overrides.only.is_some() {
+        return Err("beside auto, write +NAME or -NAME".into());
+    }
+    Ok(overrides)
+}
+
+fn effect(name: &str) -> Result<EffectSet, String> {
+    EffectSet::by_name(name).ok_or_else(|| {
+        let names = EffectSet::NAMES.map(|(_, name)| name).join(", ");
+        format!("unknown effect '{name}'; there are: auto, none, {names}")
+    })
+}
+
+fn aov_names() -> String {
+    Aov::ALL.map(Aov::name).join(", ")
+}
+
+fn whole(s: &str) -> Option<u32> {
+    s.trim().parse().ok()
+}
+
+fn finite(s: &str) -> Option<f64> {
+    s.trim().parse().ok().filter(|x: &f64| x.is_finite())
+}
+
+fn numbers<const N: usize>(s: &str) -> Option<[f64; N]> {
+    let list: Option<Vec<f64>> = s.split(',').map(finite).collect();
+    list?.try_into().ok()
+}
+
+/// IEC 61966-2-1.
+pub(crate) fn srgb_to_linear(c: f64) -> f64 {
+    if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn resolution_takes_x_and_comma() {
+        let hd = Resolution { width: 1280, height: 720 };
+        for s in ["1280x720", "1280,720", "1280X720", "1280, 720"] {
+            assert_eq!(resolution(s), Ok(hd), "{s}");
+        }
+        for s in ["", "1280", "1280x", "x720", "0x720", "1280x0", "-1x5", "1.5x2", "1x2x3", "999999x999999"] {
+            assert!(resolution(s).is_err(), "{s}");
+        }
+    }
+
+    #[test]
+    fn vectors_may_be_negative_but_not_nan() {
+        assert_eq!(vector("-1,2.5,-3e2"), Ok(DVec3::new(-1.0, 2.5, -300.0)));
+        for s in ["", "1,2", "1,2,3,4", "1,2,nan", "inf,0,0", "a,b,c"] {
+            assert!(vector(s).is_err(), "{s}");
+        }
+        assert!(direction("0,0,0").is_err());
+        assert_eq!(direction("0,-2,0"), Ok(DVec3::NEG_Y));
+    }
+
+    #[test]
+    fn a_clip_box_may_be_given_by_any_two_corners() {
+        assert_eq!(clip_box("1,-1,0,-1,1,2"), Ok((DVec3::new(-1.0, -1.0, 0.0), DVec3::new(1.0, 1.0, 2.0))));
+        assert!(clip_box("1,2,3").is_err());
+        assert!(plane("0,0,0,1").is_err());
+    }
+
+    #[test]
+    fn crops_are_whole_and_not_empty() {
+        assert_eq!(crop("1,2,3,4"), Ok(Crop { x: 1, y: 2, width: 3, height: 4 }));
+        for s in ["1,2,0,4", "1,2,3,0", "1,2,3", "-1,2,3,4", "1,2,3,4,5"] {
+            assert!(crop(s).is_err(), "{s}");
+        }
+    }
+
+    #[test]
+    fn colors_are_srgb() {
+        assert_eq!(color("0,0.5,1").map(|c| c.0.x), Ok(0.0));
+        assert_eq!(color("#ffffff"), Ok(Color(Vec3::ONE)));
+        assert!((color("#808080").unwrap().0.y - 0.215_861).abs() < 1e-6);
+        for s in ["", "1,1", "2,0,0", "-0.1,0,0", "#fff", "#gggggg", "#+12345"] {
+            assert!(color(s).is_err(), "{s}");
+        }
+    }
+
+    #[test]
+    fn effects_change_or_replace_what_the_scene_calls_for() {
+        assert_eq!(effects("auto"), Ok(EffectOverrides::default()));
+        assert_eq!(
+            effects("auto,-shadows,+ao"),
+            Ok(EffectOverrides { only: None, add: EffectSet::AMBIENT_OCCLUSION, remove: EffectSet::SHADOWS })
+        );
+        assert_eq!(effects("-shadows").map(|e| (e.only, e.remove)), Ok((None, EffectSet::SHADOWS)));
+        assert_eq!(effects("shadows,alpha-mask").map(|e| e.only), Ok(Some(EffectSet::SHADOWS | EffectSet::ALPHA_MASK)));
+        assert_eq!(effects("none").map(|e| e.only), Ok(Some(EffectSet::empty())));
+        assert!(effects("auto,shadows").unwrap_err().contains("+NAME"));
+        assert!(effects("sparkles").unwrap_err().contains("punctual-lights"));
+    }
+
+    #[test]
+    fn every_aov_is_an_integrator_too() {
+        for aov in Aov::ALL {
+            assert_eq!(integrator(aov.name()), Ok(IntegratorChoice::Aov(aov)));
+        }
+        assert_eq!(integrator("ao"), Ok(IntegratorChoice::AmbientOcclusion));
+        assert!(integrator("path-of-least-resistance").is_err());
+        assert_eq!(aovs("depth,normal,depth"), Ok(AovList(vec![Aov::Depth, Aov::Normal])));
+        assert!(aovs("depth,,normal").is_err());
+    }
+
+    #[test]
+    fn axes_are_read_in_either_case() {
+        assert_eq!(up_axis("z"), Ok(UpAxis::PosZ));
+        assert_eq!(up_axis("-Y"), Ok(UpAxis::NegY));
+        assert!(up_axis("W").is_err());
+    }
+}
