@@ -1,0 +1,246 @@
+//! The JSON part: parsing with places, the version, and references between elements.
+
+use std::fmt;
+use std::path::Path;
+
+use gltf::json::{Index, Root};
+use serde::Deserialize;
+use serde_json::Value;
+use serde_path_to_error::Segment;
+
+use crate::ImportError;
+
+/// Reads the JSON text.
+///
+/// The tree of values is returned beside the typed model: it keeps transforms in f64.
+///
+/// # Errors
+/// If it is no JSON, no glTF 2, or a value has the wrong type.
+pub(super) fn parse(file: &Path, text: &[u8]) -> Result<(Root, Value), ImportError> {
+    // Some editors put a byte order mark in front, which JSON readers may pass over (RFC 8259).
+    let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
+    let mut value: Value =
+        serde_json::from_slice(text).map_err(|e| ImportError::invalid(file, "", format!("not JSON: {e}")))?;
+    check_version(file, &value)?;
+    // The model wants this list, though the format lets it be left out.
+    for scene in value.get_mut("scenes").and_then(Value::as_array_mut).into_iter().flatten() {
+        if let Some(scene) = scene.as_object_mut() {
+            scene.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));
+        }
+    }
+    let root = typed(file, "", &value)?;
+    Ok((root, value))
+}
+
+/// Reads a value as a type; an error tells where in the value it is.
+pub(super) fn typed<'de, T: Deserialize<'de>>(
+    file: &Path,
+    pointer: &str,
+    value: &'de Value,
+) -> Result<T, ImportError> {
+    serde_path_to_error::deserialize(value).map_err(|e| {
+        let mut place = pointer.to_owned();
+        for segment in e.path() {
+            match segment {
+                Segment::Seq { index } => place += &format!("/{index}"),
+                Segment::Map { key } | Segment::Enum { variant: key } => {
+                    place += &format!("/{}", key.replace('~', "~0").replace('/', "~1"));
+                }
+                Segment::Unknown => {}
+            }
+        }
+        ImportError::invalid(file, place, e.into_inner().to_string())
+    })
+}
+
+fn check_version(file: &Path, value: &Value) -> Result<(), ImportError> {
+    let invalid = |place: &str, cause: String| Err(ImportError::invalid(file, place, cause));
+    if !value.is_object() {
+        return invalid("", "not glTF: the JSON is no object".into());
+    }
+    let Some(asset) = value.get("asset") else {
+        return invalid("/asset", "not glTF 2: it must say its version here".into());
+    };
+    let version = match asset.get("version") {
+        Some(Value::String(version)) => version,
+        // glTF 1.0 files may say it as a number or leave it out.
+        None if value.get("accessors").is_some_and(Value::is_object) => return Err(too_old(file, "1.0")),
+        Some(Value::Number(number)) if number.as_f64() == Some(1.0) => return Err(too_old(file, "1.0")),
+        _ => return invalid("/asset/version", "expected text like \"2.0\"".into()),
+    };
+    match numbers(version) {
+        Some((2, _)) => {}
+        Some((0 | 1, _)) => return Err(too_old(file, version)),
+        Some(_) => {
+            let cause = format!("glTF {version} is not supported, only glTF 2");
+            return Err(ImportError::unsupported(file, "/asset/version", cause));
+        }
+        None => return invalid("/asset/version", format!("'{version}' is no version like \"2.0\"")),
+    }
+    // Nothing above 2.0 is known; a later 2.x that needs no more than 2.0 says so by leaving this out.
+    match asset.get("minVersion").and_then(Value::as_str) {
+        Some(least) if numbers(least).is_none_or(|v| v > (2, 0)) => {
+            let cause = format!("the file needs a reader of glTF {least}; this one reads 2.0");
+            Err(ImportError::unsupported(file, "/asset/minVersion", cause))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The error for glTF 1.0.
+pub(super) fn too_old(file: &Path, version: &str) -> ImportError {
+    let cause =
+        format!("glTF {version} is not supported, only glTF 2; tools such as gltf-pipeline turn the one into the other");
+    ImportError::unsupported(file, "/asset/version", cause)
+}
+
+fn numbers(version: &str) -> Option<(u32, u32)> {
+    let (major, minor) = version.split_once('.')?;
+    let digits = |s: &str| if s.bytes().all(|b| b.is_ascii_digit()) { s.parse().ok() } else { None };
+    // "1.0.1" was written by some.
+    Some((digits(major)?, digits(minor.split('.').next()?)?))
+}
+
+/// Checks every reference between elements, so that what follows may index without fear.
+///
+/// # Errors
+/// The first reference that leads nowhere.
+pub(super) fn check_references(file: &Path, root: &Root) -> Result<(), ImportError> {
+    let check = References { file };
+    let (nodes, accessors, views) = (root.nodes.len(), root.accessors.len(), root.buffer_views.len());
+    let textures = root.textures.len();
+    for (i, view) in root.buffer_views.iter().enumerate() {
+        check.one(Some(view.buffer), root.buffers.len(), format_args!("/bufferViews/{i}/buffer"))?;
+    }
+    for (i, a) in root.accessors.iter().enumerate() {
+        check.one(a.buffer_view, views, format_args!("/accessors/{i}/bufferView"))?;
+        if let Some(s) = &a.sparse {
+            check.one(Some(s.indices.buffer_view), views, format_args!("/accessors/{i}/sparse/indices/bufferView"))?;
+            check.one(Some(s.values.buffer_view), views, format_args!("/accessors/{i}/sparse/values/bufferView"))?;
+        }
+    }
+    for (i, image) in root.images.iter().enumerate() {
+        check.one(image.buffer_view, views, format_args!("/images/{i}/bufferView"))?;
+    }
+    for (i, t) in root.textures.iter().enumerate() {
+        check.one(t.sampler, root.samplers.len(), format_args!("/textures/{i}/sampler"))?;
+        // The model's mark for "no source".
+        if t.source.value() != u32::MAX as usize {
+            check.one(Some(t.source), root.images.len(), format_args!("/textures/{i}/source"))?;
+        }
+    }
+    for (i, m) in root.materials.iter().enumerate() {
+        let pbr = &m.pbr_metallic_roughness;
+        let of = |t: &Option<gltf::json::texture::Info>| t.as_ref().map(|t| t.index);
+        for (name, texture) in [
+            ("pbrMetallicRoughness/baseColorTexture", of(&pbr.base_color_texture)),
+            ("pbrMetallicRoughness/metallicRoughnessTexture", of(&pbr.metallic_roughness_texture)),
+            ("normalTexture", m.normal_texture.as_ref().map(|t| t.index)),
+            ("occlusionTexture", m.occlusion_texture.as_ref().map(|t| t.index)),
+            ("emissiveTexture", of(&m.emissive_texture)),
+        ] {
+            check.one(texture, textures, format_args!("/materials/{i}/{name}/index"))?;
+        }
+    }
+    for (i, mesh) in root.meshes.iter().enumerate() {
+        for (k, p) in mesh.primitives.iter().enumerate() {
+            let at = format!("/meshes/{i}/primitives/{k}");
+            check.one(p.indices, accessors, format_args!("{at}/indices"))?;
+            check.one(p.material, root.materials.len(), format_args!("{at}/material"))?;
+            for (semantic, &accessor) in &p.attributes {
+                check.one(Some(accessor), accessors, format_args!("{at}/attributes/{}", semantic.to_string()))?;
+            }
+            for (j, target) in p.targets.iter().flatten().enumerate() {
+                for (name, a) in
+                    [("POSITION", target.positions), ("NORMAL", target.normals), ("TANGENT", target.tangents)]
+                {
+                    check.one(a, accessors, format_args!("{at}/targets/{j}/{name}"))?;
+                }
+            }
+        }
+    }
+    for (i, node) in root.nodes.iter().enumerate() {
+        check.one(node.mesh, root.meshes.len(), format_args!("/nodes/{i}/mesh"))?;
+        check.one(node.camera, root.cameras.len(), format_args!("/nodes/{i}/camera"))?;
+        check.one(node.skin, root.skins.len(), format_args!("/nodes/{i}/skin"))?;
+        check.all(node.children.as_deref().unwrap_or_default(), nodes, format_args!("/nodes/{i}/children"))?;
+        let light = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
+        let lights = root.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
+        let count = lights.map_or(0, |l| l.lights.len());
+        check.one(light.map(|l| l.light), count, format_args!("/nodes/{i}/extensions/KHR_lights_punctual/light"))?;
+    }
+    for (i, skin) in root.skins.iter().enumerate() {
+        check.one(skin.inverse_bind_matrices, accessors, format_args!("/skins/{i}/inverseBindMatrices"))?;
+        check.one(skin.skeleton, nodes, format_args!("/skins/{i}/skeleton"))?;
+        check.all(&skin.joints, nodes, format_args!("/skins/{i}/joints"))?;
+    }
+    for (i, scene) in root.scenes.iter().enumerate() {
+        check.all(&scene.nodes, nodes, format_args!("/scenes/{i}/nodes"))?;
+    }
+    check.one(root.scene, root.scenes.len(), format_args!("/scene"))
+}
+
+struct References<'a> {
+    file: &'a Path,
+}
+
+impl References<'_> {
+    fn one<T>(&self, index: Option<Index<T>>, count: usize, place: fmt::Arguments<'_>) -> Result<(), ImportError> {
+        match index {
+            Some(i) if i.value() >= count => {
+                let cause = format!("element {} does not exist: there are {count}", i.value());
+                Err(ImportError::invalid(self.file, place.to_string(), cause))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn all<T>(&self, indices: &[Index<T>], count: usize, place: fmt::Arguments<'_>) -> Result<(), ImportError> {
+        for (k, &i) in indices.iter().enumerate() {
+            self.one(Some(i), count, format_args!("{place}/{k}"))?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn error(text: &str) -> String {
+        let file = Path::new("a.gltf");
+        parse(file, text.as_bytes()).and_then(|(root, _)| check_references(file, &root)).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn old_and_new_versions_are_refused_by_name() {
+        for old in [
+            r#"{"asset": {"version": "1.0"}}"#,
+            r#"{"asset": {"version": 1.0}}"#,
+            r#"{"asset": {"version": "1.0.1"}}"#,
+            r#"{"asset": {}, "accessors": {}}"#,
+        ] {
+            assert!(error(old).contains("only glTF 2"), "{old}: {}", error(old));
+        }
+        assert!(error(r#"{"asset": {"version": "3.0"}}"#).contains("glTF 3.0 is not supported"));
+        assert!(error(r#"{"asset": {"version": "2.0", "minVersion": "2.1"}}"#).starts_with("a.gltf: /asset/minVersion"));
+        assert!(parse(Path::new(""), br#"{"asset": {"version": "2.1"}}"#).is_ok());
+    }
+
+    #[test]
+    fn values_of_the_wrong_type_are_placed() {
+        let text = r#"{"asset": {"version": "2.0"}, "nodes": [{}, {"children": [0, "x"]}]}"#;
+        assert!(error(text).starts_with("a.gltf: /nodes/1/children/1: invalid type: string"), "{}", error(text));
+    }
+
+    #[test]
+    fn references_that_lead_nowhere_are_placed() {
+        let text = r#"{"asset": {"version": "2.0"}, "nodes": [{"mesh": 7}], "meshes": []}"#;
+        assert_eq!(error(text), "a.gltf: /nodes/0/mesh: element 7 does not exist: there are 0");
+    }
+
+    #[test]
+    fn a_scene_may_be_empty() {
+        assert!(parse(Path::new(""), br#"{"asset": {"version": "2.0"}, "scenes": [{}]}"#).is_ok());
+    }
+}

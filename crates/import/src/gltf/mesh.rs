@@ -1,0 +1,498 @@
+//! Primitives of meshes: vertex attributes, indices, topologies, morph targets
+//! (glTF 2.0 specification, section 3.7.2).
+
+use glam::{Affine2, Vec2, Vec3, Vec4};
+use gltf::json::accessor::{ComponentType, Type};
+use gltf::json::mesh::{Mode, Semantic};
+use gltf::json::validation::Checked;
+use gltf::json::{self, Index};
+
+use super::accessor::{Accessor, Format};
+use super::bake::Influence;
+use super::source::Source;
+use super::tangent;
+use crate::scene::TriangleMesh;
+use crate::{ErrorKind, ImportError, Report};
+
+/// Triangles as the file has them: morph targets applied, normals and tangents only where they are given.
+pub(super) struct Primitive {
+    /// Its number in the mesh.
+    pub(super) number: usize,
+    pub(super) material: Option<usize>,
+    pub(super) mesh: TriangleMesh,
+    /// Sets of joints and weights; empty or as long as the positions.
+    pub(super) influences: Vec<Vec<Influence>>,
+}
+
+/// The coordinates of a normal texture: tangents must fit them.
+#[derive(Clone, Copy)]
+pub(super) struct NormalMapping {
+    pub(super) uv_set: usize,
+    pub(super) transform: Affine2,
+}
+
+/// Reads meshes, and counts what they hold.
+pub(super) struct MeshReader<'a> {
+    source: &'a Source<'a>,
+    quantized: bool,
+    vertices: u64,
+    triangles: u64,
+    /// Primitives of points and lines, and the place of the first.
+    undrawn: (u64, String),
+}
+
+/// Sets of texture coordinates that are kept.
+const MOST_SETS: u32 = 8;
+
+impl<'a> MeshReader<'a> {
+    pub(super) fn new(source: &'a Source<'a>) -> Self {
+        let quantized = source.uses("KHR_mesh_quantization");
+        Self { source, quantized, vertices: 0, triangles: 0, undrawn: (0, String::new()) }
+    }
+
+    /// Reads the primitives of a mesh that make triangles, with its morph targets by `weights` (the mesh's own where
+    /// there are none).
+    ///
+    /// # Errors
+    /// If an attribute has a wrong format or length, or an index is out of range.
+    pub(super) fn read(
+        &mut self,
+        mesh: Index<json::Mesh>,
+        weights: Option<&[f32]>,
+        report: &mut Report,
+    ) -> Result<Vec<Primitive>, ImportError> {
+        let json = &self.source.root.meshes[mesh.value()];
+        let weights = weights.or(json.weights.as_deref()).unwrap_or_default();
+        let mut primitives = Vec::new();
+        for (number, primitive) in json.primitives.iter().enumerate() {
+            let place = format!("/meshes/{}/primitives/{number}", mesh.value());
+            primitives.extend(self.primitive(number, place, primitive, weights, report)?);
+        }
+        Ok(primitives)
+    }
+
+    /// Warns of what cannot be drawn.
+    pub(super) fn finish(self, report: &mut Report) {
+        if self.undrawn.0 > 0 {
+            let message = format!("{} primitives of points or lines are not drawn", self.undrawn.0);
+            report.warn(self.source.file, self.undrawn.1, message);
+        }
+    }
+
+    fn primitive(
+        &mut self,
+        number: usize,
+        place: String,
+        json: &json::mesh::Primitive,
+        weights: &[f32],
+        report: &mut Report,
+    ) -> Result<Option<Primitive>, ImportError> {
+        use Semantic::{Colors, Joints, Normals, Positions, Tangents, TexCoords, Weights};
+        let source = self.source;
+        let Checked::Valid(mode) = json.mode else {
+            return Err(source.invalid(place + "/mode", "is no topology of glTF (0 to 6)"));
+        };
+        let Some(&positions) = json.attributes.get(&Checked::Valid(Positions)) else {
+            report.warn(source.file, place, "has no POSITION: nothing to draw");
+            return Ok(None);
+        };
+        let mut attributes = Attributes { source, place: &place, report, count: None };
+        let positions = attributes.read::<3>(positions, "POSITION", &[Type::Vec3], self.position_formats())?;
+        let count = positions.len();
+        attributes.count = Some(count);
+        let unit = self.unit_formats();
+
+        let mut mesh = TriangleMesh { positions: positions.into_iter().map(Vec3::from).collect(), ..Default::default() };
+        let mut influences: Vec<Vec<Influence>> = Vec::new();
+        for (semantic, &index) in &json.attributes {
+            let Checked::Valid(semantic) = semantic else { continue };
+            let name = semantic.to_string();
+            match semantic {
+                Normals => {
+                    let normals = attributes.read::<3>(index, &name, &[Type::Vec3], unit)?;
+                    mesh.normals = normals.into_iter().map(Vec3::from).collect();
+                }
+                Tangents => {
+                    let tangents = attributes.read::<4>(index, &name, &[Type::Vec4], unit)?;
+                    mesh.tangents = tangents.into_iter().map(Vec4::from).collect();
+                }
+                Colors(0) => mesh.colors = attributes.colors(index, &name)?,
+                TexCoords(set) if *set >= MOST_SETS => {
+                    attributes.warn(format!("{name} is one of more than {MOST_SETS} sets: not read"));
+                }
+                TexCoords(set) => {
+                    let uvs = attributes.read::<2>(index, &name, &[Type::Vec2], self.uv_formats())?;
+                    let set = *set as usize;
+                    mesh.uvs.resize(mesh.uvs.len().max(set + 1), Vec::new());
+                    mesh.uvs[set] = attributes.clean(uvs, &name).into_iter().map(Vec2::from).collect();
+                }
+                Joints(set) => {
+                    let Some(&other) = json.attributes.get(&Checked::Valid(Weights(*set))) else {
+                        return Err(source.invalid(format!("{place}/attributes"), format!("{name} without its weights")));
+                    };
+                    let joints = attributes.joints(index, &name)?;
+                    let weights =
+                        attributes.read::<4>(other, &format!("WEIGHTS_{set}"), &[Type::Vec4], FRACTIONS)?;
+                    influences.push(joints.into_iter().zip(weights).collect());
+                }
+                // Further colours and the application's own attributes mean nothing here.
+                Colors(_) | Weights(_) | Positions | Semantic::Extras(_) => {}
+            }
+        }
+        for (j, target) in json.targets.iter().flatten().enumerate() {
+            let weight = weights.get(j).copied().unwrap_or(0.0);
+            for (index, name, formats) in [
+                (target.positions, "POSITION", self.position_formats()),
+                (target.normals, "NORMAL", unit),
+                (target.tangents, "TANGENT", unit),
+            ] {
+                let Some(index) = index else { continue };
+                let at = format!("targets/{j}/{name}");
+                let deltas = attributes.read_at::<3>(index, &at, &[Type::Vec3], formats)?;
+                let deltas = deltas.into_iter().map(|d| Vec3::from(d) * weight);
+                match name {
+                    _ if weight == 0.0 => {}
+                    "POSITION" => mesh.positions.iter_mut().zip(deltas).for_each(|(p, d)| *p += d),
+                    "NORMAL" => mesh.normals.iter_mut().zip(deltas).for_each(|(n, d)| *n += d),
+                    _ => mesh.tangents.iter_mut().zip(deltas).for_each(|(t, d)| *t += d.extend(0.0)),
+                }
+            }
+        }
+
+        let indices = self.indices(json, &place, count)?;
+        if matches!(mode, Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
+            if self.undrawn.0 == 0 {
+                self.undrawn.1 = place;
+            }
+            self.undrawn.0 += 1;
+            return Ok(None);
+        }
+        if mode == Mode::Triangles && !indices.len().is_multiple_of(3) {
+            let message = format!("{} vertices make no whole triangles: the last are left out", indices.len());
+            report.warn(source.file, place.as_str(), message);
+        }
+        mesh.triangles = triangles(mode, &indices);
+        let mut primitive = Primitive { number, material: json.material.map(|m| m.value()), mesh, influences };
+        compact(&mut primitive);
+        self.budget(&primitive.mesh, &place)?;
+        let mesh = &mut primitive.mesh;
+        if let Some(v) = mesh.positions.iter().position(|p| !p.is_finite()) {
+            let cause = format!("a position is not finite: {}", mesh.positions[v]);
+            return Err(source.invalid(place + "/attributes/POSITION", cause));
+        }
+        tidy(mesh, |what| report.warn(source.file, place.as_str(), what));
+        if mesh.triangles.is_empty() {
+            report.warn(source.file, place.as_str(), "has no triangles: nothing to draw");
+            return Ok(None);
+        }
+        Ok(Some(primitive))
+    }
+
+    fn indices(&self, json: &json::mesh::Primitive, place: &str, count: usize) -> Result<Vec<u32>, ImportError> {
+        let Some(index) = json.indices else { return Ok((0..count as u32).collect()) };
+        let accessor = Accessor::new(self.source, index)?;
+        let place = format!("{place}/indices");
+        let component = accessor.format.0;
+        if accessor.kind != Type::Scalar || !INDICES.contains(&accessor.format) {
+            return Err(self.source.invalid(place, format!("expected SCALAR of {}", names(INDICES))));
+        }
+        let indices = accessor.integers::<1>().as_flattened().to_vec();
+        let restart = match component {
+            ComponentType::U8 => 0xff,
+            ComponentType::U16 => 0xffff,
+            _ => u32::MAX,
+        };
+        if let Some(k) = indices.iter().position(|&i| i as usize >= count || i == restart) {
+            let cause = if indices[k] == restart {
+                format!("index {restart} (number {k}) would restart the primitive, which glTF does not allow")
+            } else {
+                format!("index {} (number {k}) is out of range: there are {count} vertices", indices[k])
+            };
+            return Err(self.source.invalid(place, cause));
+        }
+        Ok(indices)
+    }
+
+    fn budget(&mut self, mesh: &TriangleMesh, place: &str) -> Result<(), ImportError> {
+        self.vertices += mesh.positions.len() as u64;
+        self.triangles += mesh.triangles.len() as u64;
+        let (most, limit) = (self.vertices.max(self.triangles), self.source.limits.elements);
+        if most > limit {
+            let cause = format!("with this primitive the scene has {most} elements, more than the limit of {limit}");
+            return Err(self.source.at(place, ErrorKind::Limit(cause)));
+        }
+        Ok(())
+    }
+
+    fn position_formats(&self) -> &'static [Format] {
+        if self.quantized { QUANTIZED } else { &QUANTIZED[..1] }
+    }
+
+    fn unit_formats(&self) -> &'static [Format] {
+        if self.quantized { QUANTIZED_UNIT } else { &QUANTIZED_UNIT[..1] }
+    }
+
+    fn uv_formats(&self) -> &'static [Format] {
+        if self.quantized { QUANTIZED } else { FRACTIONS }
+    }
+}
+
+use ComponentType::{F32, I8, I16, U8, U16, U32};
+
+/// Fractions: floats or normalised unsigned integers.
+const FRACTIONS: &[Format] = &[(F32, false), (U8, true), (U16, true)];
+const INDICES: &[Format] = &[(U8, false), (U16, false), (U32, false)];
+const JOINTS: &[Format] = &[(U8, false), (U16, false)];
+/// Positions and texture coordinates by KHR_mesh_quantization; without it positions are the first alone.
+const QUANTIZED: &[Format] = &[
+    (F32, false),
+    (I8, false),
+    (I8, true),
+    (U8, false),
+    (U8, true),
+    (I16, false),
+    (I16, true),
+    (U16, false),
+    (U16, true),
+];
+/// Normals and tangents by KHR_mesh_quantization; without it the first alone.
+const QUANTIZED_UNIT: &[Format] = &[(F32, false), (I8, true), (I16, true)];
+
+fn names(formats: &[Format]) -> String {
+    let name = |&(component, normalized): &Format| {
+        format!("{}{}", component.as_gl_enum(), if normalized { " normalized" } else { "" })
+    };
+    formats.iter().map(name).collect::<Vec<_>>().join(", ")
+}
+
+/// The attributes of one primitive.
+struct Attributes<'a> {
+    source: &'a Source<'a>,
+    place: &'a str,
+    report: &'a mut Report,
+    /// How many vertices there are, once that is known.
+    count: Option<usize>,
+}
+
+impl<'a> Attributes<'a> {
+    fn read<const N: usize>(
+        &self,
+        index: Index<json::Accessor>,
+        name: &str,
+        kinds: &[Type],
+        formats: &[Format],
+    ) -> Result<Vec<[f32; N]>, ImportError> {
+        self.read_at(index, &format!("attributes/{name}"), kinds, formats)
+    }
+
+    fn read_at<const N: usize>(
+        &self,
+        index: Index<json::Accessor>,
+        at: &str,
+        kinds: &[Type],
+        formats: &[Format],
+    ) -> Result<Vec<[f32; N]>, ImportError> {
+        Ok(self.accessor(index, at, kinds, formats)?.floats())
+    }
+
+    fn accessor(
+        &self,
+        index: Index<json::Accessor>,
+        at: &str,
+        kinds: &[Type],
+        formats: &[Format],
+    ) -> Result<Accessor<'a>, ImportError> {
+        let accessor = Accessor::new(self.source, index)?;
+        let place = || format!("{}/{at}", self.place);
+        if !kinds.contains(&accessor.kind) || !formats.contains(&accessor.format) {
+            let (component, normalized) = accessor.format;
+            let cause = format!(
+                "accessor {} is {:?} of {}; expected {kinds:?} of {}",
+                index.value(),
+                accessor.kind,
+                names(&[(component, normalized)]),
+                names(formats)
+            );
+            return Err(self.source.invalid(place(), cause));
+        }
+        if let Some(count) = self.count.filter(|&c| c != accessor.count) {
+            let cause = format!("accessor {} has {} elements for {count} vertices", index.value(), accessor.count);
+            return Err(self.source.invalid(place(), cause));
+        }
+        Ok(accessor)
+    }
+
+    fn colors(&mut self, index: Index<json::Accessor>, name: &str) -> Result<Vec<Vec4>, ImportError> {
+        let accessor = self.accessor(index, &format!("attributes/{name}"), &[Type::Vec3, Type::Vec4], FRACTIONS)?;
+        let colors = if accessor.kind == Type::Vec3 {
+            accessor.floats().into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect()
+        } else {
+            accessor.floats()
+        };
+        let colors = self.clean(colors, name);
+        Ok(colors.into_iter().map(|c| Vec4::from(c).clamp(Vec4::ZERO, Vec4::ONE)).collect())
+    }
+
+    fn joints(&self, index: Index<json::Accessor>, name: &str) -> Result<Vec<[u32; 4]>, ImportError> {
+        Ok(self.accessor(index, &format!("attributes/{name}"), &[Type::Vec4], JOINTS)?.integers())
+    }
+
+    /// Puts zeros where numbers are not finite, with a warning.
+    fn clean<const N: usize>(&mut self, mut values: Vec<[f32; N]>, name: &str) -> Vec<[f32; N]> {
+        let mut bad = 0_u64;
+        for x in values.as_flattened_mut().iter_mut().filter(|x| !x.is_finite()) {
+            *x = 0.0;
+            bad += 1;
+        }
+        if bad > 0 {
+            self.warn(format!("{name}: {bad} numbers that are not finite are taken as 0"));
+        }
+        values
+    }
+
+    fn warn(&mut self, message: String) {
+        self.report.warn(self.source.file, self.place, message);
+    }
+}
+
+/// Triangles of a primitive, wound as the specification's section 3.7.2.1 says.
+fn triangles(mode: Mode, indices: &[u32]) -> Vec<[u32; 3]> {
+    match mode {
+        Mode::TriangleStrip => {
+            let wound = |(i, w): (usize, &[u32])| if i % 2 == 0 { [w[0], w[1], w[2]] } else { [w[0], w[2], w[1]] };
+            indices.windows(3).enumerate().map(wound).collect()
+        }
+        Mode::TriangleFan => {
+            let Some((&hub, rim)) = indices.split_first() else { return Vec::new() };
+            rim.windows(2).map(|w| [w[0], w[1], hub]).collect()
+        }
+        Mode::Triangles => indices.as_chunks().0.to_vec(),
+        Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip => Vec::new(),
+    }
+}
+
+/// How many triangles a primitive makes, by what its accessors say.
+pub(super) fn triangle_count(root: &json::Root, primitive: &json::mesh::Primitive) -> u64 {
+    let positions = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
+    let Some(&accessor) = primitive.indices.as_ref().or(positions) else { return 0 };
+    let count = root.accessors[accessor.value()].count.0;
+    match primitive.mode {
+        Checked::Valid(Mode::Triangles) => count / 3,
+        Checked::Valid(Mode::TriangleStrip | Mode::TriangleFan) => count.saturating_sub(2),
+        _ => 0,
+    }
+}
+
+/// Drops vertices that no triangle uses: many primitives may share one long array.
+fn compact(primitive: &mut Primitive) {
+    fn gather<T: Copy>(values: &mut Vec<T>, kept: &[u32]) {
+        if !values.is_empty() {
+            *values = kept.iter().map(|&v| values[v as usize]).collect();
+        }
+    }
+    let mesh = &mut primitive.mesh;
+    let mut new = vec![u32::MAX; mesh.positions.len()];
+    for &v in mesh.triangles.as_flattened() {
+        new[v as usize] = 0;
+    }
+    let kept: Vec<u32> = (0..new.len() as u32).filter(|&v| new[v as usize] == 0).collect();
+    if kept.len() == new.len() {
+        return;
+    }
+    for (n, &v) in kept.iter().enumerate() {
+        new[v as usize] = n as u32;
+    }
+    mesh.triangles.as_flattened_mut().iter_mut().for_each(|v| *v = new[*v as usize]);
+    gather(&mut mesh.positions, &kept);
+    gather(&mut mesh.normals, &kept);
+    gather(&mut mesh.tangents, &kept);
+    gather(&mut mesh.colors, &kept);
+    mesh.uvs.iter_mut().for_each(|set| gather(set, &kept));
+    primitive.influences.iter_mut().for_each(|set| gather(set, &kept));
+}
+
+/// Makes normals and tangents unit. Normals that have no direction get that of the triangles around; tangents go
+/// with the normals, as the specification says, or all together if one has no direction.
+fn tidy(mesh: &mut TriangleMesh, mut warn: impl FnMut(String)) {
+    let mut bad = Vec::new();
+    for (v, n) in mesh.normals.iter_mut().enumerate() {
+        match n.try_normalize() {
+            Some(unit) => *n = unit,
+            None => bad.push(v),
+        }
+    }
+    if !bad.is_empty() {
+        warn(format!("{} normals have no direction: those of the triangles around are taken", bad.len()));
+        let mut around = vec![Vec3::ZERO; mesh.positions.len()];
+        for t in &mesh.triangles {
+            let [a, b, c] = t.map(|v| mesh.positions[v as usize]);
+            t.iter().for_each(|&v| around[v as usize] += (b - a).cross(c - a));
+        }
+        bad.into_iter().for_each(|v| mesh.normals[v] = around[v].try_normalize().unwrap_or(Vec3::Z));
+    }
+    if mesh.normals.is_empty() {
+        mesh.tangents.clear();
+    }
+    let mut lost = false;
+    for t in &mut mesh.tangents {
+        match t.truncate().try_normalize() {
+            Some(unit) => *t = unit.extend(if t.w < 0.0 { -1.0 } else { 1.0 }),
+            None => lost = true,
+        }
+    }
+    if lost {
+        warn("a tangent has no direction: all are computed anew where they are needed".into());
+        mesh.tangents.clear();
+    }
+}
+
+/// Adds tangents where a normal texture needs them and the file gives none.
+pub(super) fn complete(mesh: &mut TriangleMesh, mapping: Option<NormalMapping>) {
+    if let Some(NormalMapping { uv_set, transform }) = mapping
+        && mesh.tangents.is_empty()
+    {
+        tangent::generate(mesh, uv_set, transform);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strips_and_fans_keep_the_winding() {
+        let indices = [10, 11, 12, 13, 14];
+        assert_eq!(triangles(Mode::TriangleStrip, &indices), [[10, 11, 12], [11, 13, 12], [12, 13, 14]]);
+        assert_eq!(triangles(Mode::TriangleFan, &indices), [[11, 12, 10], [12, 13, 10], [13, 14, 10]]);
+        assert_eq!(triangles(Mode::Triangles, &indices), [[10, 11, 12]]);
+        for mode in [Mode::TriangleStrip, Mode::TriangleFan, Mode::Triangles] {
+            (0..3).for_each(|n| assert!(triangles(mode, &indices[..n]).is_empty()));
+        }
+    }
+
+    #[test]
+    fn vertices_that_nothing_uses_are_dropped() {
+        let positions: Vec<Vec3> = (0..5).map(|i| Vec3::splat(i as f32)).collect();
+        let mesh = TriangleMesh { positions, triangles: vec![[4, 1, 3]], ..Default::default() };
+        let mut p = Primitive { number: 0, material: None, mesh, influences: Vec::new() };
+        compact(&mut p);
+        assert_eq!(p.mesh.positions, [Vec3::splat(1.0), Vec3::splat(3.0), Vec3::splat(4.0)]);
+        assert_eq!(p.mesh.triangles, [[2, 0, 1]]);
+    }
+
+    #[test]
+    fn normals_without_direction_come_from_the_triangles() {
+        let mut mesh = TriangleMesh {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+            triangles: vec![[0, 1, 2]],
+            normals: vec![Vec3::new(0.0, 0.0, 2.0), Vec3::ZERO, Vec3::NAN],
+            tangents: vec![Vec4::new(3.0, 0.0, 0.0, -2.0); 3],
+            ..Default::default()
+        };
+        let mut warnings = Vec::new();
+        tidy(&mut mesh, |w| warnings.push(w));
+        assert_eq!(mesh.normals, [Vec3::Z; 3]);
+        assert_eq!(mesh.tangents, [Vec4::new(1.0, 0.0, 0.0, -1.0); 3]);
+        assert_eq!(warnings.len(), 1);
+    }
+}

@@ -1,0 +1,120 @@
+//! A glTF file with its buffers: what all other modules here read from.
+
+use std::borrow::Cow;
+use std::ops::Range;
+use std::path::Path;
+
+use gltf::json::{Index, Root, buffer};
+
+use super::uri::{self, Uri};
+use crate::files::{self, Folder};
+use crate::{ErrorKind, ImportError, Limits};
+
+/// The parsed JSON, its references checked, and the bytes that it refers to.
+pub(super) struct Source<'a> {
+    pub(super) file: &'a Path,
+    pub(super) root: &'a Root,
+    pub(super) folder: Folder,
+    pub(super) limits: &'a Limits,
+    /// `None`: the file gives no data (a fallback of a compressed buffer).
+    buffers: Vec<Option<Cow<'a, [u8]>>>,
+}
+
+impl<'a> Source<'a> {
+    /// Reads the buffers.
+    ///
+    /// # Errors
+    /// If a buffer is not there, or shorter than it says.
+    pub(super) fn new(
+        file: &'a Path,
+        root: &'a Root,
+        bin: Option<&'a [u8]>,
+        limits: &'a Limits,
+    ) -> Result<Self, ImportError> {
+        let mut source = Self { file, root, folder: Folder::of(file)?, limits, buffers: Vec::new() };
+        for (i, buffer) in root.buffers.iter().enumerate() {
+            let place = format!("/buffers/{i}");
+            let bytes = match (&buffer.uri, bin) {
+                (Some(uri), _) => Some(Cow::Owned(source.resource(uri, &format!("{place}/uri"))?)),
+                (None, Some(bin)) if i == 0 => Some(Cow::Borrowed(bin)),
+                (None, _) => None,
+            };
+            let (wanted, found) = (buffer.byte_length.0, bytes.as_ref().map(|b| b.len() as u64));
+            if found.is_some_and(|found| found < wanted) {
+                let cause = format!("says {wanted} bytes, but its data have {}", found.unwrap_or(0));
+                return Err(source.invalid(format!("{place}/byteLength"), cause));
+            }
+            source.buffers.push(bytes);
+        }
+        Ok(source)
+    }
+
+    /// The data of a URI: of the URI itself or of a file in the model's folder.
+    pub(super) fn resource(&self, text: &str, place: &str) -> Result<Vec<u8>, ImportError> {
+        match uri::parse(text).map_err(|cause| self.invalid(place, cause))? {
+            Uri::Data(bytes) => Ok(bytes),
+            Uri::File(name) => {
+                let path = self.folder.find_uri(name).map_err(|kind| match kind {
+                    ErrorKind::Io(e) => self.at(place, ErrorKind::Invalid(format!("'{name}' cannot be read: {e}"))),
+                    kind => self.at(place, kind),
+                })?;
+                files::read(&path, self.limits)
+            }
+        }
+    }
+
+    /// The bytes of a buffer view.
+    ///
+    /// # Errors
+    /// If it leaves its buffer, or the buffer has no data.
+    pub(super) fn view(&self, index: Index<buffer::View>) -> Result<&[u8], ImportError> {
+        let range = self.check_view(index)?;
+        let buffer = self.root.buffer_views[index.value()].buffer.value();
+        // The buffer has at least the bytes that it says.
+        self.buffers[buffer].as_ref().map(|bytes| &bytes[range]).ok_or_else(|| {
+            self.invalid(format!("/bufferViews/{}/buffer", index.value()), format!("buffer {buffer} has no data"))
+        })
+    }
+
+    /// The bytes of its buffer that a buffer view means.
+    ///
+    /// # Errors
+    /// If it leaves its buffer.
+    pub(super) fn check_view(&self, index: Index<buffer::View>) -> Result<Range<usize>, ImportError> {
+        let view = &self.root.buffer_views[index.value()];
+        let available = self.root.buffers[view.buffer.value()].byte_length.0;
+        let (start, length) = (view.byte_offset.map_or(0, |o| o.0), view.byte_length.0);
+        match start.checked_add(length).filter(|&end| end <= available) {
+            Some(end) => Ok(start as usize..end as usize),
+            None => {
+                let buffer = view.buffer.value();
+                let cause = format!("{length} bytes from byte {start} leave buffer {buffer}, which has {available}");
+                Err(self.invalid(format!("/bufferViews/{}", index.value()), cause))
+            }
+        }
+    }
+
+    /// Whether an accessor lies in a buffer without data.
+    pub(super) fn lacks_data(&self, accessor: usize) -> bool {
+        let accessor = &self.root.accessors[accessor];
+        let sparse = accessor.sparse.as_ref().map(|s| [s.indices.buffer_view, s.values.buffer_view]);
+        let mut views = accessor.buffer_view.into_iter().chain(sparse.into_iter().flatten());
+        views.any(|v| self.buffers[self.root.buffer_views[v.value()].buffer.value()].is_none())
+    }
+
+    /// An error at a place in the file.
+    pub(super) fn at(&self, place: impl Into<String>, kind: ErrorKind) -> ImportError {
+        ImportError::new(self.file, place, kind)
+    }
+
+    /// The file breaks the format.
+    pub(super) fn invalid(&self, place: impl Into<String>, cause: impl Into<String>) -> ImportError {
+        self.at(place, ErrorKind::Invalid(cause.into()))
+    }
+
+    /// Whether the file says that it uses an extension.
+    pub(super) fn uses(&self, extension: &str) -> bool {
+        let declared = |list: &[String]| list.iter().any(|e| e == extension);
+        declared(&self.root.extensions_used) || declared(&self.root.extensions_required)
+    }
+}

@@ -1,0 +1,217 @@
+//! Textures: images, samplers and transforms of coordinates (glTF 2.0 specification, section 3.8).
+
+use std::collections::BTreeMap;
+
+use glam::{Affine2, Mat2, Vec2};
+use gltf::json::extensions::texture::TextureTransform;
+use gltf::json::texture::{MagFilter, MinFilter, Sampler, WrappingMode};
+use gltf::json::validation::Checked;
+use gltf::json::{Index, Texture};
+use serde_json::{Map, Value};
+
+use super::json;
+use super::source::Source;
+use crate::image::{self, Encoded};
+use crate::scene::{Channel, Filter, ImageDesc, TextureRef, Wrap};
+use crate::{ImportError, Report};
+
+/// Textures as materials call for them; images are numbered in the order of their first use.
+pub(super) struct Textures<'a> {
+    source: &'a Source<'a>,
+    /// By the number in the file; `None` stands for a texture without a readable image.
+    numbers: BTreeMap<Option<usize>, usize>,
+    /// The images that are used, by the number in the file.
+    used: Vec<Option<usize>>,
+}
+
+/// What the different kinds of texture references of a material have in common.
+pub(super) struct Info<'a> {
+    pub(super) index: Index<Texture>,
+    pub(super) tex_coord: u32,
+    /// KHR_texture_transform, where the JSON model has a type for it...
+    pub(super) transform: Option<TextureTransform>,
+    /// ...and where it has not.
+    pub(super) others: Option<&'a Map<String, Value>>,
+}
+
+impl<'a> From<&'a gltf::json::texture::Info> for Info<'a> {
+    fn from(info: &'a gltf::json::texture::Info) -> Self {
+        let transform = info.extensions.as_ref().and_then(|e| e.texture_transform.clone());
+        Self { index: info.index, tex_coord: info.tex_coord, transform, others: None }
+    }
+}
+
+impl<'a> Textures<'a> {
+    pub(super) fn new(source: &'a Source<'a>) -> Self {
+        Self { source, numbers: BTreeMap::new(), used: Vec::new() }
+    }
+
+    /// The reference to a texture; `place` is that of the reference in the file.
+    ///
+    /// # Errors
+    /// If the texture does not exist or its transform is no such thing.
+    pub(super) fn reference(
+        &mut self,
+        info: Info<'_>,
+        channel: Channel,
+        place: &str,
+        report: &mut Report,
+    ) -> Result<TextureRef, ImportError> {
+        let root = self.source.root;
+        let Some(texture) = root.textures.get(info.index.value()) else {
+            let cause = format!("element {} does not exist: there are {}", info.index.value(), root.textures.len());
+            return Err(self.source.invalid(format!("{place}/index"), cause));
+        };
+        let image = self.image_of(texture, info.index.value(), report)?;
+        let next = self.used.len();
+        let image = *self.numbers.entry(image).or_insert_with(|| {
+            self.used.push(image);
+            next
+        });
+        let transform = match (info.transform, info.others.and_then(|o| o.get("KHR_texture_transform"))) {
+            (None, Some(value)) => {
+                let place = format!("{place}/extensions/KHR_texture_transform");
+                Some(json::typed(self.source.file, &place, value)?)
+            }
+            (typed, _) => typed,
+        };
+        let sampler = texture.sampler.map(|s| &root.samplers[s.value()]);
+        Ok(TextureRef {
+            uv_set: transform.as_ref().and_then(|t| t.tex_coord).unwrap_or(info.tex_coord) as usize,
+            transform: transform.map_or(Affine2::IDENTITY, |t| affine(&t)),
+            wrap_u: sampler.map_or(Wrap::Repeat, |s| wrap(s.wrap_s)),
+            wrap_v: sampler.map_or(Wrap::Repeat, |s| wrap(s.wrap_t)),
+            filter: sampler.map_or(Filter::Linear, filter),
+            channel,
+            ..TextureRef::new(image)
+        })
+    }
+
+    /// The image that a texture shows: of those that extensions offer the first that can be read, else its source.
+    fn image_of(
+        &self,
+        texture: &Texture,
+        index: usize,
+        report: &mut Report,
+    ) -> Result<Option<usize>, ImportError> {
+        let others = texture.extensions.as_ref().map(|e| &e.others);
+        if let Some(webp) = others.and_then(|o| o.get("EXT_texture_webp")).and_then(|e| e.get("source")) {
+            let place = format!("/textures/{index}/extensions/EXT_texture_webp/source");
+            let count = self.source.root.images.len();
+            return match webp.as_u64() {
+                Some(i) if i < count as u64 => Ok(Some(i as usize)),
+                _ => Err(self.source.invalid(place, format!("{webp} does not exist: there are {count}"))),
+            };
+        }
+        // The JSON model's mark for "no source".
+        if texture.source.value() == u32::MAX as usize {
+            let place = format!("/textures/{index}");
+            report.warn(self.source.file, place, "has no image that can be read: white is shown instead");
+            return Ok(None);
+        }
+        Ok(Some(texture.source.value()))
+    }
+
+    /// Decodes the images that are used, in parallel. One that cannot be read is replaced, with a warning.
+    pub(super) fn decode(self, report: &mut Report) -> Vec<ImageDesc> {
+        let names: Vec<String> = self.used.iter().map(|&i| self.name(i)).collect();
+        let mut encoded = Vec::new();
+        for (k, index) in self.used.iter().enumerate() {
+            match index.map(|i| self.bytes(i)) {
+                Some(Ok(bytes)) => encoded.push((k, bytes)),
+                Some(Err(e)) => report.warn(e.file, e.place, format!("{}: white is shown instead", e.kind)),
+                None => {}
+            }
+        }
+        let sources: Vec<_> = encoded.iter().map(|(k, bytes)| Encoded { name: &names[*k], bytes }).collect();
+        let mut images: Vec<ImageDesc> = names.iter().map(|n| image::placeholder(n)).collect();
+        for (&(k, _), decoded) in encoded.iter().zip(image::decode_all(&sources, self.source.limits)) {
+            match decoded {
+                Ok(image) => images[k] = image,
+                Err(cause) => {
+                    let place = self.used[k].map_or(String::new(), |i| format!("/images/{i}"));
+                    report.warn(self.source.file, place, format!("{}: {cause}: white is shown instead", names[k]));
+                }
+            }
+        }
+        images
+    }
+
+    fn bytes(&self, index: usize) -> Result<Vec<u8>, ImportError> {
+        let image = &self.source.root.images[index];
+        let place = format!("/images/{index}");
+        match (&image.uri, image.buffer_view) {
+            (Some(uri), _) => self.source.resource(uri, &(place + "/uri")),
+            (None, Some(view)) => self.source.view(view).map(<[u8]>::to_vec),
+            (None, None) => Err(self.source.invalid(place, "has neither a URI nor a buffer view")),
+        }
+    }
+
+    /// The image's name, else its file's, else its number.
+    fn name(&self, index: Option<usize>) -> String {
+        let Some(index) = index else { return "no image".into() };
+        let image = &self.source.root.images[index];
+        let file = image.uri.as_ref().filter(|u| !u.starts_with("data:"));
+        image.name.clone().or_else(|| file.cloned()).unwrap_or_else(|| format!("image {index}"))
+    }
+}
+
+/// The matrix of KHR_texture_transform: scale, then rotation, then offset.
+///
+/// The rotation is counter-clockwise as one sees the image, that is, with v running down: the extension's text and
+/// Khronos's test model say so, against its GLSL snippet, which turns the other way.
+fn affine(t: &TextureTransform) -> Affine2 {
+    let (sin, cos) = t.rotation.0.sin_cos();
+    let scale = Vec2::from(t.scale.0);
+    let rotation = Mat2::from_cols(Vec2::new(cos, -sin), Vec2::new(sin, cos));
+    Affine2::from_mat2_translation(rotation * Mat2::from_diagonal(scale), Vec2::from(t.offset.0))
+}
+
+fn wrap(mode: Checked<WrappingMode>) -> Wrap {
+    match mode {
+        Checked::Valid(WrappingMode::ClampToEdge) => Wrap::Clamp,
+        Checked::Valid(WrappingMode::MirroredRepeat) => Wrap::Mirror,
+        Checked::Valid(WrappingMode::Repeat) | Checked::Invalid => Wrap::Repeat,
+    }
+}
+
+/// Nearest where the file asks for it when magnified, or only when minified and without mip-maps.
+fn filter(sampler: &Sampler) -> Filter {
+    match (sampler.mag_filter, sampler.min_filter) {
+        (Some(Checked::Valid(MagFilter::Nearest)), _) | (None, Some(Checked::Valid(MinFilter::Nearest))) => {
+            Filter::Nearest
+        }
+        _ => Filter::Linear,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use gltf::json::extensions::texture::{TextureTransformOffset, TextureTransformRotation, TextureTransformScale};
+
+    use super::*;
+
+    #[test]
+    fn rotation_turns_as_in_khronos_test_model() {
+        // TextureTransformTest: the arrow's tip, on the diagonal of the image, must show at the green marker, which
+        // stands at (0.42095, 1.01627) in the coordinates of the quad that is turned by 22.5 degrees.
+        let t = TextureTransform {
+            rotation: TextureTransformRotation(0.392_699_08),
+            ..TextureTransform::default()
+        };
+        let at = affine(&t).transform_point2(Vec2::new(0.420_951_8, 1.016_267_5));
+        assert!((at.x - at.y).abs() < 1e-5, "{at}");
+    }
+
+    #[test]
+    fn scale_comes_before_rotation_and_offset_last() {
+        let t = TextureTransform {
+            offset: TextureTransformOffset([10.0, 20.0]),
+            rotation: TextureTransformRotation(std::f32::consts::FRAC_PI_2),
+            scale: TextureTransformScale([2.0, 3.0]),
+            ..TextureTransform::default()
+        };
+        let at = affine(&t).transform_point2(Vec2::ONE);
+        assert!((at - Vec2::new(13.0, 18.0)).length() < 1e-5, "{at}");
+    }
+}
