@@ -247,7 +247,8 @@ mod tests {
     /// Reads accessor 0 of a file whose only buffer is `bin`.
     fn with<T>(json: &str, bin: &[u8], f: impl FnOnce(Accessor<'_>) -> T) -> Result<T, String> {
         let (limits, file) = (Limits::default(), Path::new("a.gltf"));
-        let text = format!(r#"{{"asset": {{"version": "2.0"}}, "buffers": [{{"byteLength": {}}}], {json}}}"#, bin.len());
+        let text =
+            format!(r#"{{"asset": {{"version": "2.0"}}, "buffers": [{{"byteLength": {}}}], {json}}}"#, bin.len());
         let root = Root::from_str(&text).map_err(|e| e.to_string())?;
         let source = Source::new(file, &root, Some(bin), &limits).map_err(|e| e.to_string())?;
         Accessor::new(&source, Index::new(0)).map(f).map_err(|e| e.to_string())
@@ -256,7 +257,9 @@ mod tests {
     fn one(accessor: &str, stride: Option<usize>, bin: &[u8]) -> Result<Vec<[f32; 2]>, String> {
         let stride = stride.map_or(String::new(), |s| format!(r#", "byteStride": {s}"#));
         let view = format!(r#"{{"buffer": 0, "byteLength": {}{stride}}}"#, bin.len());
-        with(&format!(r#""bufferViews": [{view}], "accessors": [{{"bufferView": 0, {accessor}}}]"#), bin, |a| a.floats())
+        with(&format!(r#""bufferViews": [{view}], "accessors": [{{"bufferView": 0, {accessor}}}]"#), bin, |a| {
+            a.floats()
+        })
     }
 
     #[test]

@@ -92,11 +92,8 @@ pub(super) fn deform(mesh: &mut TriangleMesh, transform: impl Fn(usize) -> DAffi
         if let Some(normal) = mesh.normals.get_mut(v) {
             // Scaled to the length 1 first: cofactors of tiny matrices would underflow.
             let b = a * (1.0 / largest(a));
-            let cofactors = DMat3::from_cols(
-                b.y_axis.cross(b.z_axis),
-                b.z_axis.cross(b.x_axis),
-                b.x_axis.cross(b.y_axis),
-            );
+            let cofactors =
+                DMat3::from_cols(b.y_axis.cross(b.z_axis), b.z_axis.cross(b.x_axis), b.x_axis.cross(b.y_axis));
             let moved = (cofactors * normal.as_dvec3() * side).try_normalize();
             flat |= moved.is_none();
             *normal = moved.unwrap_or(DVec3::Z).as_vec3();

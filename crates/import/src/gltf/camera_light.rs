@@ -128,6 +128,9 @@ fn cone(light: &Light, warn: &mut impl FnMut(&str, String)) -> Option<(f32, f32)
     }
     let wider = if outer > 0.0 { outer.min(FRAC_PI_2) } else { std::f32::consts::FRAC_PI_4 };
     let narrower = if inner >= 0.0 { inner.min(wider * 0.999) } else { 0.0 };
-    warn("spot", format!("angles {inner} and {outer} are taken as {narrower} and {wider}: expected 0 <= inner < outer <= pi/2"));
+    warn(
+        "spot",
+        format!("angles {inner} and {outer} are taken as {narrower} and {wider}: expected 0 <= inner < outer <= pi/2"),
+    );
     Some((narrower, wider))
 }

@@ -33,11 +33,7 @@ pub(super) fn parse(file: &Path, text: &[u8]) -> Result<(Root, Value), ImportErr
 }
 
 /// Reads a value as a type; an error tells where in the value it is.
-pub(super) fn typed<'de, T: Deserialize<'de>>(
-    file: &Path,
-    pointer: &str,
-    value: &'de Value,
-) -> Result<T, ImportError> {
+pub(super) fn typed<'de, T: Deserialize<'de>>(file: &Path, pointer: &str, value: &'de Value) -> Result<T, ImportError> {
     serde_path_to_error::deserialize(value).map_err(|e| {
         let mut place = pointer.to_owned();
         for segment in e.path() {
@@ -89,8 +85,9 @@ fn check_version(file: &Path, value: &Value) -> Result<(), ImportError> {
 
 /// The error for glTF 1.0.
 pub(super) fn too_old(file: &Path, version: &str) -> ImportError {
-    let cause =
-        format!("glTF {version} is not supported, only glTF 2; tools such as gltf-pipeline turn the one into the other");
+    let cause = format!(
+        "glTF {version} is not supported, only glTF 2; tools such as gltf-pipeline turn the one into the other"
+    );
     ImportError::unsupported(file, "/asset/version", cause)
 }
 
@@ -223,7 +220,9 @@ mod tests {
             assert!(error(old).contains("only glTF 2"), "{old}: {}", error(old));
         }
         assert!(error(r#"{"asset": {"version": "3.0"}}"#).contains("glTF 3.0 is not supported"));
-        assert!(error(r#"{"asset": {"version": "2.0", "minVersion": "2.1"}}"#).starts_with("a.gltf: /asset/minVersion"));
+        assert!(
+            error(r#"{"asset": {"version": "2.0", "minVersion": "2.1"}}"#).starts_with("a.gltf: /asset/minVersion")
+        );
         assert!(parse(Path::new(""), br#"{"asset": {"version": "2.1"}}"#).is_ok());
     }
 

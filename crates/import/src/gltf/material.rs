@@ -16,15 +16,16 @@ use crate::{ImportError, Report};
 ///
 /// # Errors
 /// If one refers to a texture that does not exist.
-pub(super) fn read(
-    source: &Source<'_>,
-    textures: &mut Textures<'_>,
+pub(super) fn read<'a>(
+    source: &'a Source<'a>,
+    textures: &mut Textures<'a>,
     report: &mut Report,
 ) -> Result<Vec<MaterialDesc>, ImportError> {
     let materials = source.root.materials.iter().enumerate();
     materials
         .map(|(i, json)| {
-            let mut reader = Reader { source, textures: &mut *textures, report: &mut *report, place: format!("/materials/{i}") };
+            let mut reader =
+                Reader { source, textures: &mut *textures, report: &mut *report, place: format!("/materials/{i}") };
             let model = MaterialModel::Pbr(Box::new(reader.material(json)?));
             Ok(MaterialDesc { name: json.name.clone().unwrap_or_else(|| format!("material {i}")), model })
         })
@@ -66,9 +67,7 @@ impl Reader<'_, '_> {
         m.alpha_mode = match json.alpha_mode {
             Checked::Valid(JsonAlphaMode::Opaque) => AlphaMode::Opaque,
             Checked::Valid(JsonAlphaMode::Blend) => AlphaMode::Blend,
-            Checked::Valid(JsonAlphaMode::Mask) => {
-                AlphaMode::Mask { cutoff: json.alpha_cutoff.map_or(0.5, |c| c.0) }
-            }
+            Checked::Valid(JsonAlphaMode::Mask) => AlphaMode::Mask { cutoff: json.alpha_cutoff.map_or(0.5, |c| c.0) },
             Checked::Invalid => {
                 let place = format!("{}/alphaMode", self.place);
                 return Err(self.source.invalid(place, "expected \"OPAQUE\", \"MASK\" or \"BLEND\""));
@@ -118,11 +117,11 @@ impl Reader<'_, '_> {
         }
         if let Some(e) = &extensions.volume {
             let place = "extensions/KHR_materials_volume";
-            m.thickness =
-                self.positive(&format!("{place}/thicknessFactor"), Vec3::splat(e.thickness_factor.0)).x;
+            m.thickness = self.positive(&format!("{place}/thicknessFactor"), Vec3::splat(e.thickness_factor.0)).x;
             m.thickness_texture = self.texture(&format!("{place}/thicknessTexture"), &e.thickness_texture, Green)?;
-            m.attenuation_color =
-                self.within(&format!("{place}/attenuationColor"), Vec3::from(e.attenuation_color.0).extend(1.0)).truncate();
+            m.attenuation_color = self
+                .within(&format!("{place}/attenuationColor"), Vec3::from(e.attenuation_color.0).extend(1.0))
+                .truncate();
             m.attenuation_distance = e.attenuation_distance.0;
             if !(m.attenuation_distance > 0.0) {
                 let message = format!("{} is not above 0: nothing is absorbed", m.attenuation_distance);
@@ -153,8 +152,7 @@ impl Reader<'_, '_> {
         m.metallic = 0.0;
         m.metallic_texture = None;
         m.specular_color = self.positive(&format!("{place}/specularFactor"), Vec3::from(e.specular_factor.0)) / 0.04;
-        m.specular_color_texture =
-            self.texture(&format!("{place}/specularGlossinessTexture"), both, Channel::Red)?;
+        m.specular_color_texture = self.texture(&format!("{place}/specularGlossinessTexture"), both, Channel::Red)?;
         m.roughness_texture = self.texture(&format!("{place}/specularGlossinessTexture"), both, Channel::Alpha)?;
         // Roughness is what glossiness leaves to 1.
         m.roughness = if m.roughness_texture.is_some() { 1.0 } else { 1.0 - glossiness };

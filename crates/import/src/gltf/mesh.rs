@@ -102,7 +102,8 @@ impl<'a> MeshReader<'a> {
         attributes.count = Some(count);
         let unit = self.unit_formats();
 
-        let mut mesh = TriangleMesh { positions: positions.into_iter().map(Vec3::from).collect(), ..Default::default() };
+        let mut mesh =
+            TriangleMesh { positions: positions.into_iter().map(Vec3::from).collect(), ..Default::default() };
         let mut influences: Vec<Vec<Influence>> = Vec::new();
         for (semantic, &index) in &json.attributes {
             let Checked::Valid(semantic) = semantic else { continue };
@@ -128,11 +129,12 @@ impl<'a> MeshReader<'a> {
                 }
                 Joints(set) => {
                     let Some(&other) = json.attributes.get(&Checked::Valid(Weights(*set))) else {
-                        return Err(source.invalid(format!("{place}/attributes"), format!("{name} without its weights")));
+                        return Err(
+                            source.invalid(format!("{place}/attributes"), format!("{name} without its weights"))
+                        );
                     };
                     let joints = attributes.joints(index, &name)?;
-                    let weights =
-                        attributes.read::<4>(other, &format!("WEIGHTS_{set}"), &[Type::Vec4], FRACTIONS)?;
+                    let weights = attributes.read::<4>(other, &format!("WEIGHTS_{set}"), &[Type::Vec4], FRACTIONS)?;
                     influences.push(joints.into_iter().zip(weights).collect());
                 }
                 // Further colours and the application's own attributes mean nothing here.
@@ -198,8 +200,8 @@ impl<'a> MeshReader<'a> {
         }
         let indices = accessor.integers::<1>().as_flattened().to_vec();
         let restart = match component {
-            ComponentType::U8 => 0xff,
-            ComponentType::U16 => 0xffff,
+            U8 => 0xff,
+            U16 => 0xffff,
             _ => u32::MAX,
         };
         if let Some(k) = indices.iter().position(|&i| i as usize >= count || i == restart) {

@@ -146,8 +146,10 @@ fn place_meshes(
         let name = json.name.clone().unwrap_or_else(|| format!("mesh {i}"));
         let shown = shown_by.remove(&i).unwrap_or_default();
         // Instances come last, since the mesh itself goes to them.
-        let (instances, special): (Vec<_>, Vec<_>) =
-            shown.into_iter().map(|n| (n, placement(source, nodes, n))).partition(|(_, p)| matches!(p, Placement::Instance));
+        let (instances, special): (Vec<_>, Vec<_>) = shown
+            .into_iter()
+            .map(|n| (n, placement(source, nodes, n)))
+            .partition(|(_, p)| matches!(p, Placement::Instance));
         for (node, how) in special {
             let weights = source.root.nodes[node].weights.as_deref();
             let mut primitives = reader.read(index, weights, &mut Report::default())?;
@@ -215,7 +217,8 @@ fn skinned(
             transforms.push(transform.ok_or_else(|| {
                 let mesh = json.mesh.map_or(0, |m| m.value());
                 let place = format!("/meshes/{mesh}/primitives/{}/attributes", p.number);
-                let cause = format!("a vertex hangs at joints {influences:?}, but skin {} has {}", skin.value(), joints.len());
+                let cause =
+                    format!("a vertex hangs at joints {influences:?}, but skin {} has {}", skin.value(), joints.len());
                 source.invalid(place, cause)
             })?);
         }

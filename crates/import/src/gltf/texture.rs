@@ -88,12 +88,7 @@ impl<'a> Textures<'a> {
     }
 
     /// The image that a texture shows: of those that extensions offer the first that can be read, else its source.
-    fn image_of(
-        &self,
-        texture: &Texture,
-        index: usize,
-        report: &mut Report,
-    ) -> Result<Option<usize>, ImportError> {
+    fn image_of(&self, texture: &Texture, index: usize, report: &mut Report) -> Result<Option<usize>, ImportError> {
         let others = texture.extensions.as_ref().map(|e| &e.others);
         if let Some(webp) = others.and_then(|o| o.get("EXT_texture_webp")).and_then(|e| e.get("source")) {
             let place = format!("/textures/{index}/extensions/EXT_texture_webp/source");
@@ -195,10 +190,7 @@ mod tests {
     fn rotation_turns_as_in_khronos_test_model() {
         // TextureTransformTest: the arrow's tip, on the diagonal of the image, must show at the green marker, which
         // stands at (0.42095, 1.01627) in the coordinates of the quad that is turned by 22.5 degrees.
-        let t = TextureTransform {
-            rotation: TextureTransformRotation(0.392_699_08),
-            ..TextureTransform::default()
-        };
+        let t = TextureTransform { rotation: TextureTransformRotation(0.392_699_08), ..TextureTransform::default() };
         let at = affine(&t).transform_point2(Vec2::new(0.420_951_8, 1.016_267_5));
         assert!((at.x - at.y).abs() < 1e-5, "{at}");
     }
