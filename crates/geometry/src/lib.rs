@@ -18,6 +18,7 @@ pub mod clip;
 pub mod distance;
 pub mod error;
 pub mod frustum;
+pub mod mesh;
 pub mod offset;
 mod precision;
 pub mod quadratic;
