@@ -64,15 +64,23 @@ fn every_public_file_gives_its_triangles_or_says_why_not() {
         let result = obj::read(&path, &Options::default());
         if let Some((_, cause)) = broken.iter().find(|(name, _)| path.ends_with(name)) {
             let error = result.expect_err("broken on purpose").to_string();
-            if !error.contains(cause) {eprintln!("{error}");}
+            if !error.contains(cause) {
+                eprintln!("{error}");
+            }
             seen += 1;
             continue;
         }
-        let Ok(imported) = result else {eprintln!("{}", result.unwrap_err()); continue};
+        let Ok(imported) = result else {
+            eprintln!("{}", result.unwrap_err());
+            continue;
+        };
         check(&imported.scene, &path);
         for w in &imported.report.warnings {
-        eprintln!("W {w}"); }
-        if triangles(&imported.scene)!= expected { eprintln!( "{}: {:?} {} {expected}", path.display(), imported.report.warnings, triangles(&imported.scene)) };
+            eprintln!("W {w}");
+        }
+        if triangles(&imported.scene) != expected {
+            eprintln!("{}: {:?} {} {expected}", path.display(), imported.report.warnings, triangles(&imported.scene))
+        };
     }
     assert_eq!(seen, broken.len());
 }

@@ -409,7 +409,7 @@ impl<'a> Parser<'a> {
             format!("{n} faces left out, because a vertex of theirs is infinite or not a number")
         });
         self.bad_attribute.report(report, file, |n| {
-            format!("{n} texture coordinates or normals are missing or not finite; done without them")
+            format!("{n} texture coordinates or normals do not exist or are not finite; done without them")
         });
         Ok(self.model)
     }

@@ -51,14 +51,20 @@ impl Triangulator {
             let [a, b, c] = t.map(|i| points[i as usize]);
             (b - a).cross(c - a).dot(area) / area2
         };
+        // How far the worst triangle of a fan turns the wrong way.
+        let worst = |apex: u32| fan(apex).map(signed).fold(f64::INFINITY, f64::min);
         // Coordinates have six or seven digits: corners on a line turn the wrong way by so much.
-        let covers = |apex: u32| fan(apex).all(|t| signed(t) >= -1e-6);
-        // The two ways to cut a quadrilateral are the fans of its first two corners.
-        for apex in 0..if n == 4 { 2 } else { 1 } {
-            if covers(apex) {
-                out.extend(fan(apex));
-                return Outcome::Good;
-            }
+        let slack = -1e-6;
+        let first = worst(0);
+        if n == 4 {
+            // The fans of the first two corners are the two ways to cut along a diagonal.
+            let apex = if first >= slack || first >= worst(1) { 0 } else { 1 };
+            out.extend(fan(apex));
+            return Outcome::Good;
+        }
+        if first >= slack {
+            out.extend(fan(0));
+            return Outcome::Good;
         }
         if points.len() > MOST_CORNERS {
             out.extend(fan(0));
