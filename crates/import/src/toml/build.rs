@@ -124,7 +124,7 @@ impl Builder<'_> {
             Body::Model(model) => self.model(place, model, material, transform),
             Body::Mesh(mesh) => self.surface(named("mesh"), SurfaceDesc::Triangles(mesh), material, transform),
             Body::Shape(shape, standing) => {
-                self.surface(named(shape.kind()), SurfaceDesc::Shape(shape), material, transform * standing)
+                self.surface(named(shape.kind()), SurfaceDesc::Shape(*shape), material, transform * standing)
             }
         }
     }

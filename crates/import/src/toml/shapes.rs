@@ -17,13 +17,13 @@ pub(super) enum Body<'a> {
     /// Triangles.
     Mesh(TriangleMesh),
     /// A shape, and where it stands.
-    Shape(geometry::Shape<f64>, DAffine3),
+    Shape(Box<geometry::Shape<f64>>, DAffine3),
 }
 
 /// Makes what an object is.
 pub(super) fn body(s: &Shape) -> Result<Body<'_>, String> {
     let text = |e: geometry::ShapeError| e.to_string();
-    let here = |shape: geometry::Shape<f64>| Ok(Body::Shape(shape, DAffine3::IDENTITY));
+    let here = |shape: geometry::Shape<f64>| Ok(Body::Shape(shape.into(), DAffine3::IDENTITY));
     match s {
         Shape::Model(model) => Ok(Body::Model(model)),
         Shape::Mesh { positions, triangles, normals, uvs } => Ok(Body::Mesh(mesh(positions, triangles, normals, uvs)?)),
@@ -48,12 +48,12 @@ pub(super) fn body(s: &Shape) -> Result<Body<'_>, String> {
         }
         Shape::Ellipsoid { center, radii } => {
             let surface = Quadric::ellipsoid(radii.0).map_err(text)?;
-            Ok(Body::Shape(surface.into(), DAffine3::from_translation(center.0)))
+            Ok(Body::Shape(Box::new(surface.into()), DAffine3::from_translation(center.0)))
         }
         Shape::Cylinder { from, to, radius, caps } => {
             let (standing, length) = between(from.0, to.0)?;
             let surface = Quadric::cylinder(radius.0, 0.0, length).map_err(text)?;
-            Ok(Body::Shape(closed_if(*caps, surface), standing))
+            Ok(Body::Shape(closed_if(*caps, surface).into(), standing))
         }
         Shape::Cone { from, to, radius, top_radius, caps } => {
             let (standing, length) = between(from.0, to.0)?;
@@ -67,12 +67,12 @@ pub(super) fn body(s: &Shape) -> Result<Body<'_>, String> {
                 DVec3::new(f64::INFINITY, length, f64::INFINITY),
             );
             let surface = Quadric::cone(radius.0, 0.0, apex).and_then(|q| q.with_clip(upright)).map_err(text)?;
-            Ok(Body::Shape(closed_if(*caps, surface), standing))
+            Ok(Body::Shape(closed_if(*caps, surface).into(), standing))
         }
         Shape::Paraboloid { from, to, radius, caps } => {
             let (standing, length) = between(from.0, to.0)?;
             let surface = Quadric::paraboloid(radius.0, length).map_err(text)?;
-            Ok(Body::Shape(closed_if(*caps, surface), standing))
+            Ok(Body::Shape(closed_if(*caps, surface).into(), standing))
         }
         Shape::HyperboloidOne { from, to, waist_radius, radius, caps } => {
             let (standing, length) = between(from.0, to.0)?;
@@ -82,7 +82,7 @@ pub(super) fn body(s: &Shape) -> Result<Body<'_>, String> {
             }
             let rise = half / ((radius.0 / waist).powi(2) - 1.0).sqrt();
             let surface = Quadric::hyperboloid_one(waist, rise, -half, half).map_err(text)?;
-            Ok(Body::Shape(closed_if(*caps, surface), standing * DAffine3::from_translation(DVec3::Y * half)))
+            Ok(Body::Shape(closed_if(*caps, surface).into(), standing * DAffine3::from_translation(DVec3::Y * half)))
         }
         Shape::HyperboloidTwo { from, to, gap, radius, caps } => {
             let (standing, length) = between(from.0, to.0)?;
@@ -92,7 +92,7 @@ pub(super) fn body(s: &Shape) -> Result<Body<'_>, String> {
             }
             let slope = positive("radius", *radius)? / ((half / rise).powi(2) - 1.0).sqrt();
             let surface = Quadric::hyperboloid_two(slope, rise, -half, half).map_err(text)?;
-            Ok(Body::Shape(closed_if(*caps, surface), standing * DAffine3::from_translation(DVec3::Y * half)))
+            Ok(Body::Shape(closed_if(*caps, surface).into(), standing * DAffine3::from_translation(DVec3::Y * half)))
         }
     }
 }
