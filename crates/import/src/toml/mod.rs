@@ -13,6 +13,8 @@ mod materials;
 mod place;
 mod schema;
 mod shapes;
+#[cfg(test)]
+mod tests;
 mod values;
 
 use std::path::{Path, PathBuf};
