@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use glam::{DAffine3, DMat3, DVec3};
 
-use crate::{ErrorKind, ImportError, Limits, Report, SceneDesc, files, toml};
+use crate::{ErrorKind, ImportError, Limits, Report, SceneDesc, files, gltf, obj, toml};
 
 /// Which axis of the file points up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -505,4 +505,3 @@ fn the_whole_scene_is_turned_upright() {
     assert!(near(scene.cameras[0].transform.translation, [0.0, 0.0, 5.0]));
     assert!(near(scene.cameras[0].transform.transform_vector3(DVec3::Y), [0.0, 1.0, 0.0]));
 }
-
