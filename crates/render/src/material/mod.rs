@@ -1,7 +1,260 @@
 //! Materials: compiled from the scene's descriptions, evaluated at a hit into the lobes that scatter there.
 
-mod fresnel;
-#[allow(dead_code, reason = "the integrators that call it follow")]
-mod lobes;
-#[allow(dead_code, reason = "the integrators that call it follow")]
+mod bsdf;
+pub(crate) mod fresnel;
+pub(crate) mod lobes;
 mod microfacet;
+mod pbr;
+
+use std::sync::Arc;
+
+use firsthit_import::scene::{ImageDesc, MaterialDesc, MaterialModel, TextureRef};
+use glam::Vec3;
+
+pub(crate) use bsdf::Bsdf;
+use fresnel::Fresnel;
+use lobes::{GgxReflection, GgxTransmission, Lambert, Lobe, SpecularReflection, SpecularTransmission};
+use microfacet::Masking;
+use pbr::Pbr;
+
+use crate::surface::Surface;
+use crate::texture::{ColorSpace, Texture, TextureLookup};
+use crate::{EffectSet, StageError};
+
+/// Smoothest surface that is treated as rough: below it, a delta function is nearer to the truth than f32.
+const LEAST_ALPHA: f32 = 1e-3;
+
+/// What is decided once for all materials.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Conventions {
+    /// As the reference scenes have it: see `Settings::reference_conventions`.
+    pub(crate) reference: bool,
+    /// Effects that are left out are not compiled into the materials.
+    pub(crate) effects: EffectSet,
+}
+
+/// A material, ready to be evaluated.
+#[derive(Clone, Debug)]
+pub(crate) struct Material {
+    model: Model,
+    conventions: Conventions,
+    /// Light that is taken away inside, per unit of length.
+    pub(crate) absorption: Vec3,
+    /// Boundary of a solid through which light goes.
+    pub(crate) solid: bool,
+    /// Index of refraction of the solid.
+    pub(crate) ior: f32,
+}
+
+#[derive(Clone, Debug)]
+enum Model {
+    Pbr(Box<Pbr>),
+    Diffuse(Vec3),
+    Mirror(Vec3),
+    Glass,
+    RoughMirror { alpha: f32, reflectance: Vec3 },
+    RoughGlass { alpha: f32 },
+    Emission(Vec3),
+}
+
+/// What a surface does with light at one point.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shading {
+    /// How it scatters.
+    pub(crate) bsdf: Bsdf,
+    /// What it sends to the viewer by itself.
+    pub(crate) emission: Vec3,
+    /// Its colour, for the picture of that name.
+    pub(crate) base_color: Vec3,
+}
+
+/// Textures of a scene, decoded when a material first asks for them.
+pub(crate) struct Textures<'a> {
+    images: &'a [ImageDesc],
+    mips: bool,
+    made: Vec<[Option<Arc<Texture>>; 2]>,
+}
+
+impl<'a> Textures<'a> {
+    pub(crate) fn new(images: &'a [ImageDesc], mips: bool) -> Self {
+        Self { images, mips, made: vec![[None, None]; images.len()] }
+    }
+
+    fn get(&mut self, reference: Option<&TextureRef>, space: ColorSpace) -> Result<Option<TextureLookup>, StageError> {
+        let Some(reference) = reference else { return Ok(None) };
+        let slot = self
+            .made
+            .get_mut(reference.image)
+            .map(|slots| &mut slots[usize::from(space == ColorSpace::Srgb)])
+            .ok_or(StageError::NoSuchImage(reference.image))?;
+        let texture = match slot {
+            Some(texture) => texture.clone(),
+            None => slot.insert(Arc::new(Texture::new(&self.images[reference.image], space)?)).clone(),
+        };
+        Ok(Some(TextureLookup::new(texture, reference, self.mips)))
+    }
+}
+
+impl Material {
+    pub(crate) fn new(
+        desc: &MaterialDesc,
+        textures: &mut Textures<'_>,
+        conventions: Conventions,
+    ) -> Result<Self, StageError> {
+        let mut material =
+            Self { model: Model::Glass, conventions, absorption: Vec3::ZERO, solid: false, ior: 1.0 };
+        material.model = match &desc.model {
+            MaterialModel::Pbr(desc) => {
+                let pbr = Pbr::new(desc, textures, conventions)?;
+                if pbr.is_solid() {
+                    material.solid = true;
+                    material.ior = desc.ior;
+                    material.absorption = pbr::absorption(desc, conventions);
+                }
+                Model::Pbr(Box::new(pbr))
+            }
+            MaterialModel::Diffuse { albedo } => Model::Diffuse(*albedo),
+            MaterialModel::Mirror { reflectance } => Model::Mirror(*reflectance),
+            MaterialModel::Glass { ior } => {
+                (material.solid, material.ior) = (true, *ior);
+                Model::Glass
+            }
+            MaterialModel::RoughMirror { alpha, reflectance } => {
+                Model::RoughMirror { alpha: alpha.max(LEAST_ALPHA), reflectance: *reflectance }
+            }
+            MaterialModel::RoughGlass { ior, alpha } => {
+                (material.solid, material.ior) = (true, *ior);
+                Model::RoughGlass { alpha: alpha.max(LEAST_ALPHA) }
+            }
+            MaterialModel::Emission { radiance } => Model::Emission(*radiance),
+        };
+        Ok(material)
+    }
+
+    fn pbr(&self) -> Option<&Pbr> {
+        if let Model::Pbr(pbr) = &self.model { Some(pbr) } else { None }
+    }
+
+    /// Whether its back faces are not there for rays that see (shadow rays meet both sides).
+    pub(crate) fn culls(&self) -> bool {
+        !self.solid && self.pbr().is_some_and(|p| !p.double_sided)
+    }
+
+    /// Whether it has holes, is partly there, or lets light straight through: shadow rays have to ask.
+    pub(crate) fn lets_through(&self) -> bool {
+        self.has_alpha() || self.is_clear()
+    }
+
+    /// Whether its alpha counts.
+    pub(crate) fn has_alpha(&self) -> bool {
+        self.pbr().is_some_and(Pbr::has_alpha)
+    }
+
+    /// Whether shadow rays may pass it with a change of colour.
+    pub(crate) fn is_clear(&self) -> bool {
+        !self.conventions.reference
+            && match &self.model {
+                Model::Glass | Model::RoughGlass { .. } => true,
+                Model::Pbr(pbr) => pbr.is_clear(),
+                _ => false,
+            }
+    }
+
+    /// How much of the surface is there: 1 all, 0 nothing.
+    pub(crate) fn coverage<const TEXTURES: bool>(&self, surface: &Surface<'_>) -> f32 {
+        self.pbr().map_or(1.0, |p| p.coverage::<TEXTURES>(surface))
+    }
+
+    /// What light keeps that passes straight through the surface at this cosine, where it is there.
+    pub(crate) fn straight_through<const TEXTURES: bool>(&self, surface: &Surface<'_>, cos: f32) -> Vec3 {
+        if self.conventions.reference {
+            return Vec3::ZERO;
+        }
+        match &self.model {
+            Model::Glass | Model::RoughGlass { .. } => {
+                // From either side the angle outside counts; the ray is taken as not bent.
+                Vec3::splat(1.0 - fresnel::dielectric(cos, self.ior.max(1.0)))
+            }
+            Model::Pbr(pbr) => pbr.straight_through::<TEXTURES>(surface, cos),
+            _ => Vec3::ZERO,
+        }
+    }
+
+    /// Whether the surface glows.
+    pub(crate) fn glows(&self) -> bool {
+        match &self.model {
+            Model::Pbr(pbr) => pbr.glows(),
+            Model::Emission(radiance) => radiance.max_element() > 0.0,
+            _ => false,
+        }
+    }
+
+    /// Whether it glows on both sides.
+    pub(crate) fn glows_on_both_sides(&self) -> bool {
+        self.pbr().is_some_and(|p| p.double_sided)
+    }
+
+    /// Radiance sent to the viewer by the surface itself.
+    pub(crate) fn emission<const TEXTURES: bool>(&self, surface: &Surface<'_>) -> Vec3 {
+        match &self.model {
+            Model::Pbr(pbr) if surface.front || pbr.double_sided => pbr.emission::<TEXTURES>(surface),
+            Model::Emission(radiance) if surface.front => *radiance,
+            _ => Vec3::ZERO,
+        }
+    }
+
+    /// Everything about the surface at one point.
+    pub(crate) fn shade<const TEXTURES: bool>(&self, surface: &Surface<'_>) -> Shading {
+        let emission = self.emission::<TEXTURES>(surface);
+        let normal = surface.smooth;
+        let (bsdf, base_color) = match &self.model {
+            Model::Pbr(pbr) => return pbr.shade::<TEXTURES>(surface, self.conventions, emission),
+            Model::Diffuse(albedo) => {
+                (Bsdf::new(normal).with(Lobe::Lambert(Lambert { albedo: *albedo, coat: None })), *albedo)
+            }
+            Model::Mirror(reflectance) => {
+                let lobe = SpecularReflection { fresnel: Fresnel::Constant(*reflectance) };
+                (Bsdf::new(self.bent(surface)).with(Lobe::SpecularReflection(lobe)), *reflectance)
+            }
+            Model::Glass => {
+                let eta = self.eta(surface);
+                let fresnel = Fresnel::Dielectric { eta };
+                let bsdf = Bsdf::new(self.bent(surface))
+                    .with(Lobe::SpecularReflection(SpecularReflection { fresnel }))
+                    .with(Lobe::SpecularTransmission(SpecularTransmission { eta, fresnel, tint: self.scaling(eta) }));
+                (bsdf, Vec3::ONE)
+            }
+            Model::RoughMirror { alpha, reflectance } => {
+                let fresnel = Fresnel::Constant(*reflectance);
+                let lobe = GgxReflection { alpha: *alpha, fresnel, masking: Masking::Correlated };
+                (Bsdf::new(self.bent(surface)).with(Lobe::GgxReflection(lobe)), *reflectance)
+            }
+            Model::RoughGlass { alpha } => {
+                let eta = self.eta(surface);
+                let (alpha, fresnel) = (*alpha, Fresnel::Dielectric { eta });
+                let transmission = GgxTransmission { alpha, eta, fresnel, tint: self.scaling(eta) };
+                let bsdf = Bsdf::new(self.bent(surface))
+                    .with(Lobe::GgxReflection(GgxReflection { alpha, fresnel, masking: Masking::Separate }))
+                    .with(Lobe::GgxTransmission(transmission));
+                (bsdf, Vec3::ONE)
+            }
+            Model::Emission(_) => (Bsdf::new(normal), Vec3::ZERO),
+        };
+        Shading { bsdf, emission, base_color }
+    }
+
+    fn bent(&self, surface: &Surface<'_>) -> Vec3 {
+        if self.conventions.reference { surface.smooth } else { surface.bent(surface.smooth) }
+    }
+
+    /// Index of the other side over that of the viewer's side.
+    fn eta(&self, surface: &Surface<'_>) -> f32 {
+        if surface.front { self.ior } else { 1.0 / self.ior }
+    }
+
+    /// Radiance changes with the square of the index. Between things that light enters and leaves again this cancels.
+    /// Where shadow rays pass solids unbent, and therefore unscaled, it has to be left out for both.
+    fn scaling(&self, eta: f32) -> Vec3 {
+        if self.conventions.reference { Vec3::splat(1.0 / (eta * eta)) } else { Vec3::ONE }
+    }
+}

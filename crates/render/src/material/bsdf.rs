@@ -1,0 +1,47 @@
+//! The lobes of a surface at one point, in their frame.
+
+use glam::Vec3;
+
+use super::lobes::{Lambert, Lobe};
+use crate::warp;
+
+const MAX_LOBES: usize = 3;
+
+/// The sum of a few lobes around a shading normal.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Bsdf {
+    x: Vec3,
+    y: Vec3,
+    /// The shading normal, unit, on the viewer's side.
+    pub(crate) normal: Vec3,
+    lobes: [Lobe; MAX_LOBES],
+    count: usize,
+}
+
+impl Bsdf {
+    /// Black.
+    pub(crate) fn new(normal: Vec3) -> Self {
+        let (x, y) = warp::frame(normal);
+        let none = Lobe::Lambert(Lambert { albedo: Vec3::ZERO, coat: None });
+        Self { x, y, normal, lobes: [none; MAX_LOBES], count: 0 }
+    }
+
+    /// Adds a lobe: at most three.
+    pub(crate) fn with(mut self, lobe: Lobe) -> Self {
+        self.lobes[self.count] = lobe;
+        self.count += 1;
+        self
+    }
+
+    pub(crate) fn lobes(&self) -> &[Lobe] {
+        &self.lobes[..self.count]
+    }
+
+    pub(crate) fn to_local(&self, w: Vec3) -> Vec3 {
+        Vec3::new(w.dot(self.x), w.dot(self.y), w.dot(self.normal))
+    }
+
+    pub(crate) fn to_world(&self, w: Vec3) -> Vec3 {
+        self.x * w.x + self.y * w.y + self.normal * w.z
+    }
+}
