@@ -7,13 +7,19 @@ mod effects;
 pub mod film;
 pub mod filter;
 pub mod framing;
+mod integrator;
 pub mod light;
 mod material;
 mod monitor;
 mod options;
 pub mod output;
+mod render;
 pub mod sampler;
+mod setting;
+mod stage;
 mod stats;
+mod surface;
+mod survey;
 pub mod texture;
 pub mod view;
 pub mod warp;
@@ -28,5 +34,7 @@ pub use options::{
     Background, CameraChanges, CameraChoice, Clip, Crop, EffectOverrides, EnvironmentChoice, IntegratorChoice,
     RenderOptions, StageOptions,
 };
+pub use render::{RenderError, Rendered, render};
+pub use stage::{Stage, StageError};
 pub use stats::{RayCounts, RayKind, RenderStats};
 pub use view::{View, ViewTransform};

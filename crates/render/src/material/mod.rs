@@ -126,7 +126,10 @@ impl Material {
                 (material.solid, material.ior) = (true, *ior);
                 Model::RoughGlass { alpha: alpha.max(LEAST_ALPHA) }
             }
-            MaterialModel::Emission { radiance } => Model::Emission(*radiance),
+            MaterialModel::Emission { radiance } => {
+                let glows = conventions.effects.contains(EffectSet::EMISSION);
+                Model::Emission(if glows { *radiance } else { Vec3::ZERO })
+            }
         };
         Ok(material)
     }

@@ -1,0 +1,36 @@
+//! Ambient occlusion: the share of the hemisphere over a point, weighted by the cosine, that is free nearby.
+
+use firsthit_geometry::Ray;
+use glam::Vec3;
+
+use super::whitted::Seen;
+use super::{Tracer, aov};
+use crate::RayKind;
+use crate::sampler::{Dimension, PixelSampler};
+use crate::warp;
+
+impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> {
+    /// One sample of the occlusion at the first surface that a camera ray meets; only what is nearer than `reach`
+    /// occludes. Black and transparent where there is nothing.
+    pub(crate) fn ambient_occlusion(&mut self, ray: Ray<f64>, reach: f64, sampler: PixelSampler) -> Seen {
+        let Some(hit) = self.closest(RayKind::Camera, &ray, None) else { return Seen::default() };
+        let stage = self.stage;
+        let point = stage.accel.surface_point(&ray, &hit);
+        let surface = stage.world.surface(&hit, point, -ray.direction.as_vec3(), 0.0);
+        let material = stage.world.material(hit.id);
+        let shading = stage.materials[material].shade::<TEXTURES>(&surface);
+        let first = aov::First::new(&ray, &hit, &surface, &shading, material);
+
+        let w = warp::cosine_hemisphere(sampler.get2(Dimension::Direction(0)));
+        let (x, y) = warp::frame(surface.smooth);
+        let direction = x * w.x + y * w.y + surface.smooth * w.z;
+        let mut lifted = point;
+        lifted.position += surface.lift;
+        let origin = lifted.spawn(surface.geometric.as_dvec3());
+        let away = Ray::new(origin, direction.as_dvec3()).with_interval(0.0, reach);
+        let covers = sampler.get1(Dimension::Alpha(0));
+        let occluded = self.occluded(RayKind::AmbientOcclusion, &away, hit.id, covers);
+        let color = if occluded { Vec3::ZERO } else { Vec3::ONE };
+        Seen { color, alpha: 1.0, first: Some(first) }
+    }
+}

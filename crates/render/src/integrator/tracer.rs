@@ -1,0 +1,193 @@
+//! Casting rays into a stage.
+
+use std::time::{Duration, Instant};
+
+use firsthit_accel::{Hit, HitId};
+use firsthit_geometry::Ray;
+use firsthit_geometry::clip::ClipRegion;
+use glam::{DVec3, Vec3};
+
+use crate::light::{LightEnd, LightSample};
+use crate::{EffectSet, RayCounts, RayKind, Stage};
+
+/// Time spent in rays of each kind, on pixels that are timed.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Timing {
+    seconds: [f64; RayKind::ALL.len()],
+    rays: [u64; RayKind::ALL.len()],
+}
+
+impl Timing {
+    pub(crate) fn add(&mut self, other: &Self) {
+        for k in 0..RayKind::ALL.len() {
+            self.seconds[k] += other.seconds[k];
+            self.rays[k] += other.rays[k];
+        }
+    }
+
+    pub(crate) fn seconds_per_ray(&self, kind: RayKind) -> Option<f64> {
+        let k = kind as usize;
+        (self.rays[k] > 0).then(|| self.seconds[k] / self.rays[k] as f64)
+    }
+
+    fn note(&mut self, kind: RayKind, time: Duration) {
+        self.seconds[kind as usize] += time.as_secs_f64();
+        self.rays[kind as usize] += 1;
+    }
+}
+
+/// Casts rays for one thread, and counts them.
+///
+/// `TEXTURES`: materials may have textures. `FILTERED`: some hits have to be asked about before they count (alpha,
+/// culled back faces, clear surfaces in the way of light).
+pub(crate) struct Tracer<'a, const TEXTURES: bool, const FILTERED: bool> {
+    pub(crate) stage: &'a Stage,
+    clip: Option<&'a ClipRegion<f64>>,
+    shadows: bool,
+    pub(crate) counts: RayCounts,
+    pub(crate) timing: Timing,
+    /// Whether the rays of the current pixel are timed.
+    pub(crate) timed: bool,
+}
+
+impl<'a, const TEXTURES: bool, const FILTERED: bool> Tracer<'a, TEXTURES, FILTERED> {
+    pub(crate) fn new(stage: &'a Stage, clip: &'a ClipRegion<f64>) -> Self {
+        Self {
+            stage,
+            clip: (!clip.is_all()).then_some(clip),
+            shadows: stage.plan().simulated().contains(EffectSet::SHADOWS),
+            counts: RayCounts::default(),
+            timing: Timing::default(),
+            timed: false,
+        }
+    }
+
+    /// The ray inside what is shown.
+    fn clipped(&self, ray: &Ray<f64>) -> Option<Ray<f64>> {
+        match self.clip {
+            None => Some(*ray),
+            Some(region) => region.clip(ray),
+        }
+    }
+
+    fn timed<R>(&mut self, kind: RayKind, cast: impl FnOnce(&mut Self) -> R) -> R {
+        self.counts[kind] += 1;
+        if !self.timed {
+            return cast(self);
+        }
+        let start = Instant::now();
+        let answer = cast(self);
+        self.timing.note(kind, start.elapsed());
+        answer
+    }
+
+    /// The nearest surface that a ray sees.
+    pub(crate) fn closest(&mut self, kind: RayKind, ray: &Ray<f64>, source: Option<HitId>) -> Option<Hit> {
+        self.timed(kind, |this| {
+            let ray = this.clipped(ray)?;
+            if FILTERED {
+                this.stage.accel.closest_hit_filtered(&ray, source, |hit| this.is_seen(&ray, hit))
+            } else {
+                this.stage.accel.closest_hit_filtered(&ray, source, |_| true)
+            }
+        })
+    }
+
+    /// Whether a surface is there for a ray that sees: glTF hides back faces of single-sided materials, and holes.
+    fn is_seen(&self, ray: &Ray<f64>, hit: &Hit) -> bool {
+        let world = &self.stage.world;
+        let material = world.material(hit.id);
+        let flags = self.stage.flags[material];
+        if flags.culls && !world.faces(hit.id, ray.direction) {
+            return false;
+        }
+        !flags.alpha || self.stage.materials[material].coverage::<TEXTURES>(&world.attributes(hit, true)) > 0.0
+    }
+
+    /// Whether anything lies between a point and infinity or `distance`, alpha included (clear surfaces count as
+    /// there).
+    pub(crate) fn occluded(&mut self, kind: RayKind, ray: &Ray<f64>, source: HitId, covers: f32) -> bool {
+        self.timed(kind, |this| {
+            let Some(ray) = this.clipped(ray) else { return false };
+            this.stage.accel.any_hit_filtered(&ray, Some(source), |hit| {
+                let material = this.stage.world.material(hit.id);
+                !FILTERED
+                    || !this.stage.flags[material].alpha
+                    || this.stage.materials[material]
+                        .coverage::<TEXTURES>(&this.stage.world.attributes(hit, true))
+                        > covers
+            })
+        })
+    }
+
+    /// The share of a light sample's light that arrives: shadow rays meet both sides of every surface, pass holes and
+    /// partly covering surfaces, and go straight through clear ones.
+    pub(crate) fn transmittance(&mut self, kind: RayKind, from: DVec3, sample: &LightSample, source: HitId) -> Vec3 {
+        if !self.shadows {
+            return Vec3::ONE;
+        }
+        let ray = match sample.end {
+            LightEnd::At(point) => Ray::segment(from, point),
+            LightEnd::Infinity => Ray::new(from, sample.direction.as_dvec3()),
+        };
+        self.timed(kind, |this| {
+            let Some(ray) = this.clipped(&ray) else { return Vec3::ONE };
+            if FILTERED {
+                return this.filtered_transmittance(&ray, sample.target, source);
+            }
+            let target = sample.target;
+            let blocked =
+                this.stage.accel.any_hit_filtered(&ray, Some(source), |hit| target.is_none_or(|t| t != hit.id));
+            if blocked { Vec3::ZERO } else { Vec3::ONE }
+        })
+    }
+
+    fn filtered_transmittance(&self, ray: &Ray<f64>, target: Option<HitId>, source: HitId) -> Vec3 {
+        /// Less light than this is none.
+        const NEGLIGIBLE: f32 = 1e-4;
+        let (stage, world) = (self.stage, &self.stage.world);
+        let direction = ray.direction.normalize();
+        let length = ray.direction.length();
+        let mut arrives = Vec3::ONE;
+        // Sum of (absorption x way) with entries negative and exits positive: the order of hits does not matter.
+        let mut absorbed = Vec3::ZERO;
+        let blocked = stage.accel.any_hit_filtered(ray, Some(source), |hit| {
+            if target == Some(hit.id) {
+                return false;
+            }
+            let index = world.material(hit.id);
+            if !stage.flags[index].lets_through {
+                return true;
+            }
+            let material = &stage.materials[index];
+            let surface = world.attributes(hit, true);
+            let covered = material.coverage::<TEXTURES>(&surface);
+            if covered <= 0.0 {
+                return false;
+            }
+            let mut through = Vec3::ZERO;
+            if material.is_clear() {
+                let crossing = world.crossing(hit, ray);
+                let cos = crossing.normal.dot(direction).abs() as f32;
+                through = material.straight_through::<TEXTURES>(&surface, cos);
+                if material.solid {
+                    let way = |t: f64| (t * length) as f32;
+                    let entering = crossing.normal.dot(direction) < 0.0;
+                    absorbed += material.absorption * if entering { -way(hit.t) } else { way(hit.t) };
+                    // A ball or the like is asked about once: this is its other side.
+                    if let Some(exit) = crossing.exit {
+                        through *= material.straight_through::<TEXTURES>(&surface, cos);
+                        absorbed += material.absorption * way(exit);
+                    }
+                }
+            }
+            arrives *= Vec3::splat(1.0 - covered) + through * covered;
+            arrives.max_element() < NEGLIGIBLE
+        });
+        if blocked {
+            return Vec3::ZERO;
+        }
+        // A way that ends inside (a light in a solid) leaves more entries than exits: nothing is gained by that.
+        arrives * absorbed.max(Vec3::ZERO).map(|a| (-a).exp())
+    }
+}

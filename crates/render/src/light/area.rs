@@ -1,0 +1,376 @@
+//! Glowing surfaces, sampled as lights.
+
+use std::collections::HashMap;
+use std::f64::consts::PI;
+
+use firsthit_accel::{Hit, HitId};
+use firsthit_geometry::{Primitive, Ray, Shape, shapes::Sphere};
+use firsthit_import::scene::{LightKind, SurfaceDesc};
+use glam::{DVec3, Vec3};
+
+use super::{LightEnd, LightSample};
+use crate::distribution::Distribution1D;
+use crate::surface::World;
+use crate::warp;
+
+/// A glowing rectangle or ball.
+#[derive(Clone, Debug)]
+pub(crate) struct ShapeLight {
+    form: Form,
+    pub(crate) radiance: Vec3,
+    /// The primitive of the scene that it is; `None`: a light of its own, met by rays beside the scene's trees.
+    pub(crate) id: Option<HitId>,
+}
+
+#[derive(Clone, Debug)]
+enum Form {
+    Rectangle { corner: DVec3, u: DVec3, v: DVec3, normal: DVec3, area: f64 },
+    Sphere(Sphere<f64>),
+}
+
+impl ShapeLight {
+    /// `None` for other lights, and for those that no light comes from.
+    pub(crate) fn new(kind: &LightKind) -> Option<Self> {
+        let (form, radiance) = match *kind {
+            LightKind::Rectangle { corner, edge_u, edge_v, radiance } => {
+                let normal = edge_u.cross(edge_v);
+                let area = normal.length();
+                let normal = normal.try_normalize()?;
+                (Form::Rectangle { corner, u: edge_u, v: edge_v, normal, area }, radiance)
+            }
+            LightKind::Sphere { center, radius, radiance } => {
+                (Form::Sphere(Sphere::new(center, radius).ok()?), radiance)
+            }
+            _ => return None,
+        };
+        (radiance.max_element() > 0.0).then_some(Self { form, radiance, id: None })
+    }
+
+    /// A ball that is a shape of the scene, if the instance leaves it one.
+    fn of_scene(world: &World, id: HitId, shape: &Shape<f64>, radiance: Vec3) -> Option<Self> {
+        let Shape::Sphere(sphere) = shape else { return None };
+        let m = world.instances[id.instance as usize].transform;
+        let lengths = [m.matrix3.x_axis, m.matrix3.y_axis, m.matrix3.z_axis].map(DVec3::length);
+        let right_angles = m.matrix3.x_axis.dot(m.matrix3.y_axis).abs()
+            + m.matrix3.y_axis.dot(m.matrix3.z_axis).abs()
+            + m.matrix3.z_axis.dot(m.matrix3.x_axis).abs();
+        let even = lengths.iter().all(|l| (l / lengths[0] - 1.0).abs() < 1e-6);
+        if !even || right_angles > 1e-6 * lengths[0] * lengths[0] {
+            return None;
+        }
+        let ball = Sphere::new(m.transform_point3(sphere.center()), sphere.radius() * lengths[0]).ok()?;
+        Some(Self { form: Form::Sphere(ball), radiance, id: Some(id) })
+    }
+
+    /// Where a ray meets its glowing side; from behind a rectangle is not there.
+    fn hit(&self, ray: &Ray<f64>) -> Option<f64> {
+        match &self.form {
+            Form::Rectangle { corner, u, v, normal, .. } => {
+                let facing = normal.dot(ray.direction);
+                let t = normal.dot(*corner - ray.origin) / facing;
+                let p = ray.at(t) - *corner;
+                // Coordinates along edges that need not be at right angles.
+                let (across, along) = (p.cross(*v).dot(*normal), u.cross(p).dot(*normal));
+                let area = u.cross(*v).dot(*normal);
+                let inside = across >= 0.0 && across <= area && along >= 0.0 && along <= area;
+                (facing < 0.0 && inside && ray.contains(t)).then_some(t)
+            }
+            Form::Sphere(sphere) => {
+                let hit = sphere.closest_hit(ray)?;
+                (hit.normal?.dot(ray.direction) < 0.0).then_some(hit.t)
+            }
+        }
+    }
+
+    /// Density of [`ShapeLight::sample`] over solid angle for a direction from `from` that meets the light at
+    /// `distance`.
+    pub(crate) fn pdf(&self, from: DVec3, direction: DVec3, distance: f64) -> f32 {
+        match &self.form {
+            Form::Rectangle { normal, area, .. } => {
+                (distance * distance / (area * -normal.dot(direction)).max(f64::MIN_POSITIVE)) as f32
+            }
+            Form::Sphere(sphere) => match one_minus_cos_of_ball(sphere, from) {
+                Some(x) => (1.0 / (2.0 * PI * x)) as f32,
+                None => 0.0,
+            },
+        }
+    }
+
+    /// A direction from `from` to the light.
+    pub(crate) fn sample(&self, from: DVec3, u: [f32; 2]) -> Option<LightSample> {
+        match &self.form {
+            Form::Rectangle { corner, u: edge_u, v: edge_v, normal, area } => {
+                let at = *corner + *edge_u * f64::from(u[0]) + *edge_v * f64::from(u[1]);
+                from_surface(from, at, *normal, *area, self.radiance, false, self.id)
+            }
+            Form::Sphere(sphere) => {
+                let x = one_minus_cos_of_ball(sphere, from)?;
+                let to = sphere.center() - from;
+                let axis = to.normalize().as_vec3();
+                let (tx, ty) = warp::frame(axis);
+                let w = warp::cone(u, x as f32);
+                let direction = tx * w.x + ty * w.y + axis * w.z;
+                // Directions at the rim may miss the ball by a rounding: they end at its middle's distance.
+                let d = direction.as_dvec3();
+                let t = sphere.closest_hit(&Ray::new(from, d)).map_or(to.dot(d), |h| h.t);
+                Some(LightSample {
+                    direction,
+                    radiance: self.radiance * (2.0 * PI * x) as f32,
+                    pdf: Some((1.0 / (2.0 * PI * x)) as f32),
+                    end: LightEnd::At(from + d * t),
+                    target: self.id,
+                })
+            }
+        }
+    }
+}
+
+/// 1 - cos of the half angle under which a ball is seen; `None` from inside.
+fn one_minus_cos_of_ball(sphere: &Sphere<f64>, from: DVec3) -> Option<f64> {
+    let sin2 = sphere.radius() * sphere.radius() / (sphere.center() - from).length_squared();
+    // sin^2 / (1 + cos): exact for small angles, where 1 - cos is not.
+    (sin2 < 1.0).then(|| sin2 / (1.0 + (1.0 - sin2).sqrt()))
+}
+
+/// The sample for a point that was chosen evenly on a flat light.
+fn from_surface(
+    from: DVec3,
+    at: DVec3,
+    normal: DVec3,
+    area: f64,
+    radiance: Vec3,
+    both_sides: bool,
+    target: Option<HitId>,
+) -> Option<LightSample> {
+    let to = at - from;
+    let distance2 = to.length_squared();
+    let direction = to / distance2.sqrt();
+    let cos = -normal.dot(direction);
+    let cos = if both_sides { cos.abs() } else { cos };
+    let pdf = distance2 / (area * cos);
+    if !(cos > 0.0 && pdf > 0.0 && pdf.is_finite()) {
+        return None;
+    }
+    Some(LightSample {
+        direction: direction.as_vec3(),
+        radiance: radiance / pdf as f32,
+        pdf: Some(pdf as f32),
+        end: LightEnd::At(at),
+        target,
+    })
+}
+
+/// A triangle of a glowing mesh, in the world.
+#[derive(Clone, Debug)]
+struct GlowingTriangle {
+    id: HitId,
+    corners: [DVec3; 3],
+    normal: DVec3,
+    area: f64,
+    both_sides: bool,
+}
+
+/// All glowing triangles, chosen in proportion to the light they give.
+#[derive(Clone, Debug)]
+pub(crate) struct MeshLight {
+    triangles: Vec<GlowingTriangle>,
+    table: Distribution1D,
+    /// Index of the first triangle of each (instance, geometry).
+    first: HashMap<(u32, u32), usize>,
+}
+
+impl MeshLight {
+    /// A point on a glowing triangle as seen from `from`: radiance 1 is returned with the hit, for the caller to
+    /// multiply with what the material there says. A triangle does not light itself.
+    pub(crate) fn sample(
+        &self,
+        from: DVec3,
+        choice: f32,
+        u: [f32; 2],
+        receiver: HitId,
+    ) -> Option<(LightSample, Hit)> {
+        let (i, _) = self.table.sample(choice);
+        let triangle = &self.triangles[i];
+        if triangle.id == receiver {
+            return None;
+        }
+        let [a, b, c] = warp::triangle(u);
+        let [p, q, r] = triangle.corners;
+        let at = p * f64::from(a) + q * f64::from(b) + r * f64::from(c);
+        let area = triangle.area / f64::from(self.table.probability(i));
+        let sample =
+            from_surface(from, at, triangle.normal, area, Vec3::ONE, triangle.both_sides, Some(triangle.id))?;
+        Some((sample, Hit { id: triangle.id, t: 1.0, u: b, v: c, normal: triangle.normal }))
+    }
+
+    /// Density of [`MeshLight::sample`] over solid angle for a direction that meets triangle `id` at `distance`; 0
+    /// for what is not in the table.
+    pub(crate) fn pdf(&self, id: HitId, direction: DVec3, distance: f64) -> f32 {
+        let Some(first) = self.first.get(&(id.instance, id.geometry)) else { return 0.0 };
+        let i = first + id.primitive as usize;
+        let triangle = &self.triangles[i];
+        let cos = triangle.normal.dot(direction).abs();
+        let pdf = f64::from(self.table.probability(i)) * distance * distance / (triangle.area * cos);
+        if pdf.is_finite() { pdf as f32 } else { 0.0 }
+    }
+}
+
+/// Glowing surfaces of a scene.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct AreaLights {
+    pub(crate) shapes: Vec<ShapeLight>,
+    pub(crate) mesh: Option<MeshLight>,
+    /// Glowing shapes that cannot be sampled: they are seen, but light nothing but mirrors.
+    pub(crate) unsampled: usize,
+}
+
+impl AreaLights {
+    /// `radiance(id, u, v)` says about how much comes from a point of a glowing geometry; `None` for others.
+    pub(crate) fn new(
+        lights: impl Iterator<Item = ShapeLight>,
+        world: &World,
+        glowing: impl Fn(HitId) -> Option<bool>,
+        radiance: impl Fn(HitId, f32, f32) -> Vec3,
+    ) -> Self {
+        let mut area = Self { shapes: lights.collect(), mesh: None, unsampled: 0 };
+        let (mut triangles, mut weights, mut first) = (Vec::new(), Vec::new(), HashMap::new());
+        for (i, instance) in world.instances.iter().enumerate() {
+            for (g, geometry) in world.scene.meshes[instance.mesh].geometries.iter().enumerate() {
+                let id = HitId { instance: i as u32, geometry: g as u32, primitive: 0 };
+                let Some(both_sides) = glowing(id) else { continue };
+                match &geometry.surface {
+                    SurfaceDesc::Triangles(mesh) => {
+                        first.insert((id.instance, id.geometry), triangles.len());
+                        for (k, corners) in mesh.triangles.iter().enumerate() {
+                            let id = HitId { primitive: k as u32, ..id };
+                            let local = corners.map(|c| mesh.positions[c as usize].as_dvec3());
+                            let corners = local.map(|p| instance.transform.transform_point3(p));
+                            let cross = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+                            let area = 0.5 * cross.length();
+                            // A mirrored mesh keeps its outside: glTF 2.0, section 3.7.4.
+                            let side = instance.transform.matrix3.determinant().signum();
+                            let normal = cross.normalize_or_zero() * side;
+                            let glow = radiance(id, 1.0 / 3.0, 1.0 / 3.0).max_element();
+                            triangles.push(GlowingTriangle { id, corners, normal, area, both_sides });
+                            weights.push(area as f32 * glow);
+                        }
+                    }
+                    SurfaceDesc::Shape(shape) => {
+                        match ShapeLight::of_scene(world, id, shape, radiance(id, 0.5, 0.5)) {
+                            Some(light) => area.shapes.push(light),
+                            None => area.unsampled += 1,
+                        }
+                    }
+                }
+            }
+        }
+        // A texture may glow where the estimate sees nothing: every triangle gets a small share.
+        let total: f32 = weights.iter().sum();
+        let whole: f64 = triangles.iter().map(|t| t.area).sum();
+        for (weight, triangle) in weights.iter_mut().zip(&triangles) {
+            *weight += 0.05 * total * (triangle.area / whole) as f32;
+        }
+        area.mesh = Distribution1D::new(&weights).map(|table| MeshLight { triangles, table, first });
+        area
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.shapes.is_empty() && self.mesh.is_none()
+    }
+
+    pub(crate) fn triangles(&self) -> usize {
+        self.mesh.as_ref().map_or(0, |m| m.triangles.len())
+    }
+
+    /// The nearest light of its own (not part of the scene's trees) in a ray's way.
+    pub(crate) fn hit(&self, ray: &Ray<f64>) -> Option<(f64, &ShapeLight)> {
+        let own = self.shapes.iter().filter(|l| l.id.is_none());
+        let hits = own.filter_map(|l| l.hit(ray).map(|t| (t, l)));
+        hits.min_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    /// Density with which direct light would have chosen this way to glowing primitive `id` of the scene.
+    pub(crate) fn pdf_of_primitive(&self, id: HitId, from: DVec3, direction: DVec3, distance: f64) -> f32 {
+        match self.shapes.iter().find(|l| l.id == Some(id)) {
+            Some(light) => light.pdf(from, direction, distance),
+            None => self.mesh.as_ref().map_or(0.0, |m| m.pdf(id, direction, distance)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rectangle() -> ShapeLight {
+        ShapeLight::new(&LightKind::Rectangle {
+            corner: DVec3::new(-0.5, 2.0, -0.5),
+            edge_u: DVec3::X,
+            edge_v: DVec3::Z * 1.5,
+            radiance: Vec3::ONE,
+        })
+        .unwrap()
+    }
+
+    fn ball() -> ShapeLight {
+        ShapeLight::new(&LightKind::Sphere { center: DVec3::new(1.0, 2.0, 0.5), radius: 0.7, radiance: Vec3::ONE })
+            .unwrap()
+    }
+
+    /// The mean of 1 / pdf is the solid angle, and samples hit what they are drawn from.
+    #[test]
+    fn samples_cover_the_solid_angle() {
+        let below = DVec3::new(0.3, 0.4, 0.2);
+        for (light, from) in [(ball(), DVec3::ZERO), (rectangle(), below)] {
+            let n = 400;
+            let (mut mean, mut samples) = (0.0, 0);
+            for i in 0..n {
+                for j in 0..n {
+                    let u = [(i as f32 + 0.5) / n as f32, (j as f32 + 0.5) / n as f32];
+                    let Some(s) = light.sample(from, u) else { continue };
+                    let pdf = s.pdf.unwrap();
+                    mean += 1.0 / f64::from(pdf) / f64::from(n * n);
+                    let d = s.direction.as_dvec3();
+                    if let Some(t) = light.hit(&Ray::new(from, d)) {
+                        assert!((light.pdf(from, d, t) / pdf - 1.0).abs() < 1e-3);
+                        samples += 1;
+                    }
+                }
+            }
+            assert!(samples > n * n * 99 / 100);
+            let expected = solid_angle(&light, from);
+            assert!((mean / expected - 1.0).abs() < 1e-3, "{mean} instead of {expected}");
+        }
+    }
+
+    /// By counting directions.
+    fn solid_angle(light: &ShapeLight, from: DVec3) -> f64 {
+        let n = 1500;
+        let mut sum = 0.0;
+        for i in 0..n {
+            for j in 0..n {
+                let z = (f64::from(i) + 0.5) / f64::from(n) * 2.0 - 1.0;
+                let (s, c) = ((f64::from(j) + 0.5) / f64::from(n) * std::f64::consts::TAU).sin_cos();
+                let r = (1.0 - z * z).sqrt();
+                if light.hit(&Ray::new(from, DVec3::new(r * c, r * s, z))).is_some() {
+                    sum += 4.0 * PI / f64::from(n * n);
+                }
+            }
+        }
+        sum
+    }
+
+    #[test]
+    fn a_rectangle_shines_to_one_side_only() {
+        let light = rectangle();
+        // edge_u x edge_v = X x Z = -Y.
+        assert!(light.hit(&Ray::new(DVec3::ZERO, DVec3::Y)).is_some());
+        assert!(light.hit(&Ray::new(DVec3::new(0.0, 4.0, 0.0), DVec3::NEG_Y)).is_none());
+        assert!(light.sample(DVec3::new(0.0, 4.0, 0.0), [0.5; 2]).is_none());
+    }
+
+    #[test]
+    fn there_is_no_light_inside_a_ball() {
+        assert!(ball().sample(DVec3::new(1.0, 2.0, 0.4), [0.5; 2]).is_none());
+    }
+}

@@ -1,0 +1,297 @@
+//! The driver: a stage, options, and a picture as the answer.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
+
+use firsthit_accel::TraversalCounts;
+use firsthit_geometry::Aabb;
+use firsthit_geometry::clip::{ClipRegion, HalfSpace};
+use glam::Vec3;
+use rayon::iter::ParallelIterator;
+
+use crate::camera::{Cone, FilmCamera};
+use crate::film::{Accumulator, Band};
+use crate::filter::Filter;
+use crate::integrator::whitted::{Limits, Seen};
+use crate::integrator::{Timing, Tracer};
+use crate::material::lobes::LobeKind;
+use crate::sampler::{Dimension, PixelSampler};
+use crate::{
+    Aov, Clip, EffectPlan, EffectSet, Film, IntegratorChoice, Monitor, RayCounts, RenderOptions, RenderStats, Stage,
+};
+
+/// Options that no picture can be made with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RenderError {
+    /// No pixels, or too many to address.
+    #[error("the picture cannot be {width} x {height} pixels (1 to 2^28 in all)")]
+    Size {
+        /// Width asked for.
+        width: u32,
+        /// Height asked for.
+        height: u32,
+    },
+    /// No samples.
+    #[error("at least one sample per pixel is needed")]
+    NoSamples,
+    /// The crop window has no pixel in the picture.
+    #[error("the crop window lies outside the picture")]
+    EmptyCrop,
+}
+
+/// A finished render, or as much of it as was done when it was cancelled.
+#[derive(Clone, Debug)]
+pub struct Rendered {
+    /// The picture and those beside it.
+    pub film: Film,
+    /// What was done.
+    pub stats: RenderStats,
+    /// The stage's plan with what each effect cost.
+    pub effects: EffectPlan,
+    /// Whether it was cancelled: the film then has fewer samples, but all of the picture if one pass was finished.
+    pub interrupted: bool,
+}
+
+/// Rows of a band, the unit of work of a thread.
+const BAND: u32 = 4;
+/// Of so many pixels one is timed.
+const TIMED: u32 = 61;
+/// Textures are averaged over this share of a pixel: the samples of a pixel average the rest.
+const FOOTPRINT: f64 = 0.5;
+
+/// Renders a stage, in parallel on the caller's rayon pool.
+///
+/// The same stage, options and seed give the same bits for any number of threads: every sample is a pure function of
+/// seed, pixel and sample number, and each pixel adds up its own. Samples are taken in passes over the whole picture
+/// (1, 3, 12, then 16 each), so that a cancelled render is a picture with fewer samples.
+///
+/// # Errors
+/// When the options describe no picture: see [`RenderError`].
+pub fn render<M: Monitor + ?Sized>(
+    stage: &Stage,
+    options: &RenderOptions,
+    monitor: &M,
+) -> Result<Rendered, RenderError> {
+    let (width, height) = (options.width, options.height);
+    if width == 0 || height == 0 || u64::from(width) * u64::from(height) > 1 << 28 {
+        return Err(RenderError::Size { width, height });
+    }
+    if options.spp == 0 {
+        return Err(RenderError::NoSamples);
+    }
+    let mut film = Film::new(width, height, options.crop, &options.aovs);
+    if film.window().width == 0 || film.window().height == 0 {
+        return Err(RenderError::EmptyCrop);
+    }
+    let start = Instant::now();
+    let effects = stage.plan().simulated();
+    // Chosen once: the rest is compiled for what the scene calls for.
+    let job = Job::new(stage, options, &film);
+    let (done, interrupted) = match (effects.contains(EffectSet::TEXTURES), stage.is_filtered()) {
+        (false, false) => job.run::<false, false, M>(&mut film, monitor),
+        (false, true) => job.run::<false, true, M>(&mut film, monitor),
+        (true, false) => job.run::<true, false, M>(&mut film, monitor),
+        (true, true) => job.run::<true, true, M>(&mut film, monitor),
+    };
+    let effects = stage.plan().with_costs(&done.rays, |kind| done.timing.seconds_per_ray(kind));
+    let stats = RenderStats {
+        rays: done.rays,
+        samples: done.samples,
+        bad_samples: done.bad,
+        seconds: start.elapsed().as_secs_f64(),
+    };
+    Ok(Rendered { film, stats, effects, interrupted })
+}
+
+/// What was done, by a band or by all.
+#[derive(Clone, Copy, Debug, Default)]
+struct Done {
+    rays: RayCounts,
+    timing: Timing,
+    samples: u64,
+    bad: u64,
+}
+
+impl Done {
+    fn and(mut self, other: Self) -> Self {
+        self.rays += other.rays;
+        self.timing.add(&other.timing);
+        self.samples += other.samples;
+        self.bad += other.bad;
+        self
+    }
+}
+
+/// How a camera ray is answered.
+#[derive(Clone, Copy, Debug)]
+enum Method {
+    /// Light, following these lobes.
+    Light(LobeKind),
+    /// Ambient occlusion within a distance.
+    Occlusion(f64),
+    /// A picture of values; depths are compared with a distance.
+    Values(Aov, f32),
+}
+
+/// Everything that all samples of a render share.
+struct Job<'a> {
+    stage: &'a Stage,
+    options: &'a RenderOptions,
+    aovs: Vec<Aov>,
+    camera: FilmCamera,
+    cone: Cone,
+    filter: Filter,
+    clip: ClipRegion<f64>,
+    method: Method,
+}
+
+impl<'a> Job<'a> {
+    fn new(stage: &'a Stage, options: &'a RenderOptions, film: &Film) -> Self {
+        let camera = stage.camera().on_film(options.width, options.height);
+        let cone = camera.cone();
+        let simulated = stage.plan().simulated();
+        let extent = stage.accel.bounds().extent();
+        let size = if extent.is_finite() && extent.max_element() > 0.0 { extent.length() } else { 1.0 };
+        let method = match options.integrator {
+            IntegratorChoice::Auto | IntegratorChoice::Whitted => {
+                let mut follow = LobeKind::empty();
+                follow.set(LobeKind::REFLECTION, simulated.contains(EffectSet::REFLECTION));
+                let through = EffectSet::REFRACTION | EffectSet::TRANSMISSION;
+                follow.set(LobeKind::TRANSMISSION, simulated.intersects(through));
+                Method::Light(follow)
+            }
+            IntegratorChoice::Direct => Method::Light(LobeKind::empty()),
+            IntegratorChoice::AmbientOcclusion => Method::Occlusion(0.25 * size),
+            IntegratorChoice::Aov(aov) => {
+                let focus = (stage.camera().focal_point() - stage.camera().position()).length();
+                Method::Values(aov, if focus > 0.0 { focus as f32 } else { size as f32 })
+            }
+        };
+        Self {
+            stage,
+            options,
+            aovs: film.aovs().to_vec(),
+            camera,
+            cone: Cone { width: cone.width * FOOTPRINT, spread: cone.spread * FOOTPRINT },
+            filter: if stage.reference { Filter::Box } else { Filter::blackman_harris() },
+            clip: region(&options.clip),
+            method,
+        }
+    }
+
+    /// Renders in passes until done or cancelled.
+    fn run<const TEXTURES: bool, const FILTERED: bool, M: Monitor + ?Sized>(
+        &self,
+        film: &mut Film,
+        monitor: &M,
+    ) -> (Done, bool) {
+        let window = film.window();
+        let bands = u64::from(window.height.div_ceil(BAND));
+        let total = bands * u64::from(self.options.spp);
+        let (finished, rays) = (AtomicU64::new(0), AtomicU64::new(0));
+        let mut done = Done::default();
+        let mut first = 0;
+        while first < self.options.spp {
+            let last = match first {
+                0 => 1,
+                1..4 => 4,
+                n => (n / 16 + 1) * 16,
+            }
+            .min(self.options.spp);
+            let pass = film
+                .par_bands_mut(BAND)
+                .map(|mut band| {
+                    let mut tracer = Tracer::<TEXTURES, FILTERED>::new(self.stage, &self.clip);
+                    let band_done = self.band(&mut tracer, &mut band, first..last, monitor);
+                    let finished = finished.fetch_add(u64::from(last - first), Ordering::Relaxed);
+                    let rays = rays.fetch_add(band_done.rays.total(), Ordering::Relaxed) + band_done.rays.total();
+                    monitor.progress(finished + u64::from(last - first), total, rays);
+                    band_done
+                })
+                .reduce(Done::default, Done::and);
+            done = done.and(pass);
+            if monitor.cancelled() {
+                return (done, true);
+            }
+            first = last;
+        }
+        (done, false)
+    }
+
+    fn band<const TEXTURES: bool, const FILTERED: bool, M: Monitor + ?Sized>(
+        &self,
+        tracer: &mut Tracer<'_, TEXTURES, FILTERED>,
+        band: &mut Band<'_>,
+        samples: std::ops::Range<u32>,
+        monitor: &M,
+    ) -> Done {
+        let mut done = Done::default();
+        for y in band.rows() {
+            if monitor.cancelled() {
+                break;
+            }
+            for x in band.columns() {
+                tracer.timed = (x.wrapping_mul(31).wrapping_add(y.wrapping_mul(17))) % TIMED == 0;
+                for sample in samples.clone() {
+                    done.bad += u64::from(!self.sample(tracer, band.pixel(x, y), x, y, sample));
+                    done.samples += 1;
+                }
+            }
+        }
+        done.rays = tracer.counts;
+        done.timing = tracer.timing;
+        done
+    }
+
+    /// Takes one sample; false if its numbers were no light.
+    fn sample<const TEXTURES: bool, const FILTERED: bool>(
+        &self,
+        tracer: &mut Tracer<'_, TEXTURES, FILTERED>,
+        pixel: &mut [Accumulator],
+        x: u32,
+        y: u32,
+        sample: u32,
+    ) -> bool {
+        let sampler = PixelSampler::new(self.options.seed, (x, y), sample);
+        let [dx, dy] = self.filter.offset(sampler.get2(Dimension::Pixel));
+        let at = [f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy];
+        let ray = self.camera.ray(at);
+        let screen =
+            [(at[0] / f64::from(self.options.width)) as f32, (at[1] / f64::from(self.options.height)) as f32];
+        let mut seen = match self.method {
+            Method::Light(follow) => {
+                let limits = Limits { bounces: self.options.max_depth, follow };
+                tracer.radiance(ray, self.cone, screen, sampler, limits)
+            }
+            Method::Occlusion(reach) => tracer.ambient_occlusion(ray, reach, sampler),
+            Method::Values(..) => tracer.values(ray, self.cone),
+        };
+        let heat = self.aovs.contains(&Aov::Heat) || matches!(self.method, Method::Values(Aov::Heat, _));
+        let cost = if heat { self.stage.accel.closest_hit_counted(&ray).1 } else { TraversalCounts::default() };
+        if let (Method::Values(aov, far), Some(first)) = (self.method, &seen.first) {
+            seen.color = first.shown(aov, cost, far);
+        }
+        let good = is_light(&seen);
+        let Seen { color, alpha, .. } = if good { seen } else { Seen { alpha: 1.0, ..Seen::default() } };
+        pixel[0].add([color.x, color.y, color.z, alpha.clamp(0.0, 1.0)]);
+        for (i, aov) in self.aovs.iter().enumerate() {
+            let value = seen.first.map_or([0.0; 4], |first| first.value(*aov, cost).extend(1.0).to_array());
+            pixel[1 + i].add(if value.iter().all(|v| v.is_finite()) { value } else { [0.0; 4] });
+        }
+        good
+    }
+}
+
+/// Whether a sample is light: finite and not negative.
+fn is_light(seen: &Seen) -> bool {
+    seen.color.is_finite() && seen.color.cmpge(Vec3::ZERO).all() && seen.alpha.is_finite()
+}
+
+/// The part of space that is shown.
+fn region(clip: &Clip) -> ClipRegion<f64> {
+    ClipRegion {
+        bounds: clip.bounds.map(|(a, b)| Aabb::new(a.min(b), a.max(b))),
+        half_spaces: clip.planes.iter().map(|(normal, offset)| HalfSpace::new(*normal, *offset)).collect(),
+    }
+}

@@ -1,0 +1,100 @@
+//! What surrounds the scene: chosen from the file, the caller's wish, or the built-in studio.
+
+use firsthit_import::SceneDesc;
+use firsthit_import::scene::{EnvironmentDesc, MaterialModel, Pixels};
+use glam::Vec3;
+
+use crate::stage::{Backdrop, StageError};
+use crate::{Environment, EnvironmentChoice, StageOptions};
+
+/// How bright the studio is where the file brings lights of its own: their shadows are not black then.
+const FILL: f32 = 0.15;
+
+/// What was chosen.
+pub(crate) struct Setting {
+    pub(crate) environment: Option<Environment>,
+    pub(crate) background: Backdrop,
+    /// Why.
+    pub(crate) words: Vec<String>,
+    /// The studio only fills up the file's own lights.
+    pub(crate) dim: bool,
+}
+
+/// Chooses what surrounds the scene.
+pub(crate) fn choose(scene: &SceneDesc, options: &StageOptions) -> Result<Setting, StageError> {
+    let rotation = options.environment_rotation;
+    let mut studio = None;
+    let (environment, words) = match &options.environment {
+        EnvironmentChoice::Auto => match &scene.environment {
+            Some(EnvironmentDesc::Studio { rotation: own, scale }) => {
+                studio = Some(scale.max_element());
+                (Some(Environment::studio(own + rotation, *scale)), "the studio, as the file asks")
+            }
+            Some(desc) => (from_desc(scene, desc, rotation)?, "the file's own"),
+            None if scene.settings.reference_conventions => (None, "none (a reference scene)"),
+            None if has_lights(scene) && scene.settings.camera.is_some() => {
+                (None, "none, since the scene file has lights and no environment")
+            }
+            None if has_lights(scene) => {
+                studio = Some(FILL);
+                let dim = Environment::studio(rotation, Vec3::splat(FILL));
+                (Some(dim), "a dim studio, since the file has lights of its own")
+            }
+            None => {
+                studio = Some(1.0);
+                (Some(Environment::studio(rotation, Vec3::ONE)), "the built-in studio, since the file has no lights")
+            }
+        },
+        EnvironmentChoice::Studio => {
+            studio = Some(1.0);
+            (Some(Environment::studio(rotation, Vec3::ONE)), "the built-in studio, as asked")
+        }
+        EnvironmentChoice::White => (Some(Environment::constant(Vec3::ONE)), "white, as asked"),
+        EnvironmentChoice::Black => (None, "black, as asked"),
+        EnvironmentChoice::Map { width, height, pixels } => {
+            let map = Environment::latlong(*width, *height, pixels.clone(), rotation, Vec3::ONE)?;
+            (Some(map), "the map given")
+        }
+    };
+    Ok(Setting {
+        background: Backdrop::new(options.background, studio),
+        dim: studio.is_some_and(|s| s < 1.0),
+        environment,
+        words: vec![format!("surroundings: {words}")],
+    })
+}
+
+/// Whether something in the file is there to light the scene. Glow with a texture does not count: it is decoration.
+pub(crate) fn has_lights(scene: &SceneDesc) -> bool {
+    const LAMP: f32 = 3.0;
+    let lamp = |model: &MaterialModel| match model {
+        MaterialModel::Emission { radiance } => radiance.max_element() > 0.0,
+        MaterialModel::Pbr(p) => p.emissive_texture.is_none() && !p.unlit && p.emissive.max_element() >= LAMP,
+        _ => false,
+    };
+    let mut used = scene.instances.iter().flat_map(|i| &scene.meshes[i.mesh].geometries);
+    !scene.lights.is_empty()
+        || used.any(|g| g.material.is_some_and(|m| lamp(&scene.materials[m].model)))
+}
+
+fn from_desc(scene: &SceneDesc, desc: &EnvironmentDesc, turn: f32) -> Result<Option<Environment>, StageError> {
+    Ok(match *desc {
+        EnvironmentDesc::Constant { radiance } => Some(Environment::constant(radiance)),
+        EnvironmentDesc::LatLong { image, rotation, scale } => {
+            let image = scene.images.get(image).ok_or(StageError::NoSuchImage(image))?;
+            let pixels = linear_pixels(&image.pixels);
+            Some(Environment::latlong(image.width, image.height, pixels, rotation + turn, scale)?)
+        }
+        EnvironmentDesc::Studio { rotation, scale } => Some(Environment::studio(rotation + turn, scale)),
+    })
+}
+
+/// Linear RGB; 8- and 16-bit images are taken as sRGB.
+fn linear_pixels(pixels: &Pixels) -> std::sync::Arc<[[f32; 3]]> {
+    let decode = |x: f32| if x <= 0.040_45 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) };
+    match pixels {
+        Pixels::Rgb32F(p) => p.clone(),
+        Pixels::Rgba8(p) => p.iter().map(|p| [p[0], p[1], p[2]].map(|x| decode(f32::from(x) / 255.0))).collect(),
+        Pixels::Rgba16(p) => p.iter().map(|p| [p[0], p[1], p[2]].map(|x| decode(f32::from(x) / 65535.0))).collect(),
+    }
+}

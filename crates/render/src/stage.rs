@@ -1,0 +1,278 @@
+//! The stage: a scene with everything that rendering needs, compiled once.
+
+use std::sync::Arc;
+
+use firsthit_accel::HitId;
+use firsthit_import::SceneDesc;
+use firsthit_import::scene::MaterialDesc;
+use glam::Vec3;
+
+use crate::camera::{Camera, CameraError};
+use crate::light::Lights;
+use crate::light::area::{AreaLights, ShapeLight};
+use crate::light::environment::EnvironmentError;
+use crate::light::punctual::PunctualLight;
+use crate::material::{Conventions, Material, Textures};
+use crate::setting::{self, Setting};
+use crate::surface::World;
+use crate::texture::TextureError;
+use crate::{Background, CameraChoice, EffectPlan, EffectSet, StageOptions, framing, survey};
+
+/// A scene that cannot be staged.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum StageError {
+    /// The camera that was asked for is not there.
+    #[error("there is no camera '{wanted}' ({})", available(.cameras))]
+    NoSuchCamera {
+        /// Name or index asked for.
+        wanted: String,
+        /// Names of the cameras that there are.
+        cameras: Vec<String>,
+    },
+    /// The camera is unusable.
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+    /// A texture is unusable.
+    #[error(transparent)]
+    Texture(#[from] TextureError),
+    /// A material names an image that the scene does not have.
+    #[error("image {0} does not exist")]
+    NoSuchImage(usize),
+    /// The environment map is unusable.
+    #[error(transparent)]
+    Environment(#[from] EnvironmentError),
+}
+
+fn available(cameras: &[String]) -> String {
+    if cameras.is_empty() {
+        return "the scene has none; 'auto' frames the model".into();
+    }
+    let list: Vec<String> = cameras.iter().enumerate().map(|(i, name)| format!("{i} '{name}'")).collect();
+    format!("there are: {}", list.join(", "))
+}
+
+/// A scene ready to be rendered: trees, compiled materials, lights, a camera, and the effects that are simulated.
+#[derive(Clone, Debug)]
+pub struct Stage {
+    pub(crate) world: World,
+    pub(crate) accel: firsthit_accel::Scene,
+    /// One for each material of the scene, then the default material.
+    pub(crate) materials: Vec<Material>,
+    pub(crate) flags: Vec<Flags>,
+    pub(crate) lights: Lights,
+    pub(crate) camera: Camera,
+    pub(crate) background: Backdrop,
+    pub(crate) reference: bool,
+    plan: EffectPlan,
+    explain: Vec<String>,
+}
+
+/// What rays have to ask a material before they take a hit for one.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Flags {
+    /// Back faces are not there.
+    pub(crate) culls: bool,
+    /// Alpha counts.
+    pub(crate) alpha: bool,
+    /// Shadow rays may pass.
+    pub(crate) lets_through: bool,
+}
+
+/// What the camera sees where there is nothing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Backdrop {
+    /// The environment.
+    Environment,
+    /// The studio's plain backdrop, so bright.
+    Studio(f32),
+    /// One colour.
+    Color(Vec3),
+    /// Nothing, with alpha 0.
+    Transparent,
+}
+
+impl Stage {
+    /// Compiles a scene; `accel` must have been built from it.
+    ///
+    /// ```
+    /// use std::sync::Arc;
+    /// use firsthit_accel::{BuildOptions, SceneBuilder};
+    /// use firsthit_import::SceneDesc;
+    /// use firsthit_render::{RenderOptions, Stage, StageOptions, render};
+    ///
+    /// let scene = Arc::new(SceneDesc::default());
+    /// let accel = SceneBuilder::from_desc(&scene, BuildOptions::default()).build()?;
+    /// let stage = Stage::new(scene, accel, &StageOptions::default())?;
+    /// let options = RenderOptions { width: 8, height: 8, spp: 1, ..RenderOptions::default() };
+    /// let rendered = render(&stage, &options, &())?;
+    /// assert_eq!(rendered.stats.samples, 64);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// When the camera asked for is missing or unusable, or a texture is: see [`StageError`].
+    pub fn new(
+        scene: Arc<SceneDesc>,
+        accel: firsthit_accel::Scene,
+        options: &StageOptions,
+    ) -> Result<Self, StageError> {
+        let reference = scene.settings.reference_conventions;
+        let mut explain = Vec::new();
+        let camera = choose_camera(&scene, &accel, options, &mut explain)?;
+        let Setting { environment, background, words, dim } = setting::choose(&scene, options)?;
+        explain.extend(words);
+
+        // What the scene calls for decides what is compiled.
+        let mut plan = EffectPlan::default();
+        survey::call_for_materials(&mut plan, &scene);
+        survey::call_for_lights(&mut plan, &scene, environment.as_ref(), &explain_environment(dim));
+        let headlight = if reference {
+            None
+        } else {
+            survey::headlight(&scene, &accel, &camera, options.aspect, environment.is_some())
+        };
+        if headlight.is_some() {
+            plan.call(EffectSet::SHADOWS | EffectSet::PUNCTUAL_LIGHTS, "light at the camera");
+            explain.push(
+                "light: a light at the camera and a little even light were added, since there are no lights and the \
+                 surroundings hardly reach what is seen"
+                    .into(),
+            );
+        }
+        plan.decide(&options.effects);
+        let effects = plan.simulated();
+
+        let conventions = Conventions { reference, effects };
+        let mut textures = Textures::new(&scene.images, !reference);
+        let default = MaterialDesc::default();
+        let materials = scene
+            .materials
+            .iter()
+            .chain([&default])
+            .map(|m| Material::new(m, &mut textures, conventions))
+            .collect::<Result<Vec<_>, _>>()?;
+        let flags = materials.iter().map(|m| Flags {
+            culls: !reference && m.culls(),
+            alpha: m.has_alpha(),
+            lets_through: m.lets_through(),
+        });
+        let flags = flags.collect();
+        let world = World::new(scene);
+
+        let mut punctual = Vec::new();
+        if effects.contains(EffectSet::PUNCTUAL_LIGHTS) {
+            punctual.extend(world.scene.lights.iter().filter_map(|l| PunctualLight::new(&l.kind)));
+            punctual.extend(headlight.clone());
+        }
+        let area = if effects.contains(EffectSet::AREA_LIGHTS) {
+            let lights = world.scene.lights.iter().filter_map(|l| ShapeLight::new(&l.kind));
+            let of = |id: HitId| &materials[world.material(id)];
+            AreaLights::new(
+                lights,
+                &world,
+                |id| Some(of(id)).filter(|m| m.glows()).map(Material::glows_on_both_sides),
+                |id, u, v| {
+                    let hit = firsthit_accel::Hit { id, t: 0.0, u, v, normal: glam::DVec3::Z };
+                    of(id).emission::<true>(&world.attributes(&hit, true))
+                },
+            )
+        } else {
+            AreaLights::default()
+        };
+        if area.unsampled > 0 {
+            explain.push(format!(
+                "light: {} glowing shapes other than balls are seen and mirrored, but light nothing else",
+                area.unsampled
+            ));
+        }
+        let lights = Lights {
+            punctual,
+            area,
+            environment: environment.filter(|e| effects.contains(EffectSet::ENVIRONMENT) && !e.is_black()),
+            ambient: if headlight.is_some() { survey::AMBIENT } else { Vec3::ZERO },
+        };
+        Ok(Self { world, accel, materials, flags, lights, camera, background, reference, plan, explain })
+    }
+
+    /// Which effects the scene calls for, by what, and which are simulated.
+    #[must_use]
+    pub fn plan(&self) -> &EffectPlan {
+        &self.plan
+    }
+
+    /// What was chosen (camera, surroundings, lights) and why: one line each.
+    #[must_use]
+    pub fn explain(&self) -> &[String] {
+        &self.explain
+    }
+
+    /// The scene.
+    #[must_use]
+    pub fn scene(&self) -> &Arc<SceneDesc> {
+        &self.world.scene
+    }
+
+    /// The camera.
+    #[must_use]
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// Whether any hit has to be asked about before it counts.
+    pub(crate) fn is_filtered(&self) -> bool {
+        self.flags.iter().any(|f| f.culls || f.alpha || f.lets_through)
+    }
+}
+
+fn explain_environment(dim: bool) -> String {
+    if dim { "dim studio".into() } else { "surroundings".into() }
+}
+
+fn choose_camera(
+    scene: &SceneDesc,
+    accel: &firsthit_accel::Scene,
+    options: &StageOptions,
+    explain: &mut Vec<String>,
+) -> Result<Camera, StageError> {
+    let chosen = match &options.camera {
+        CameraChoice::Auto => scene.settings.camera.filter(|i| *i < scene.cameras.len()),
+        CameraChoice::Named(wanted) => {
+            let by_name = scene.cameras.iter().position(|c| c.name == *wanted);
+            let by_index = || wanted.parse().ok().filter(|i| *i < scene.cameras.len());
+            let Some(i) = by_name.or_else(by_index) else {
+                let cameras = scene.cameras.iter().map(|c| c.name.clone()).collect();
+                return Err(StageError::NoSuchCamera { wanted: wanted.clone(), cameras });
+            };
+            Some(i)
+        }
+    };
+    let camera = match chosen {
+        Some(i) => {
+            explain.push(format!("camera: '{}' of the file", scene.cameras[i].name));
+            Camera::from_desc(&scene.cameras[i], &accel.bounds())?
+        }
+        None => {
+            let framing = framing::frame(scene, accel, options.aspect);
+            explain.push(format!("camera: {}", framing.reason));
+            framing.camera
+        }
+    };
+    if options.camera_changes == crate::CameraChanges::default() {
+        return Ok(camera);
+    }
+    explain.push("camera: changed as asked".into());
+    Ok(camera.changed(&options.camera_changes)?)
+}
+
+/// Kept beside [`Background`] so that a picture's background is decided in one place.
+impl Backdrop {
+    pub(crate) fn new(wish: Background, studio: Option<f32>) -> Self {
+        match (wish, studio) {
+            (Background::Color(c), _) => Self::Color(c),
+            (Background::Transparent, _) => Self::Transparent,
+            (Background::Auto, Some(brightness)) => Self::Studio(brightness),
+            (Background::Auto, None) => Self::Environment,
+        }
+    }
+}

@@ -1,0 +1,199 @@
+//! Looking over a scene: which effects it calls for, and whether it needs a light at the camera.
+
+use firsthit_import::SceneDesc;
+use firsthit_import::scene::{AlphaMode, LightKind, MaterialModel, PbrMaterial, SurfaceDesc};
+use glam::Vec3;
+
+use crate::camera::Camera;
+use crate::integrator::ROUGHEST_FOLLOWED;
+use crate::light::punctual::PunctualLight;
+use crate::sampler::{Dimension, PixelSampler};
+use crate::{EffectPlan, EffectSet, Environment, setting, warp};
+
+/// Even light in rooms that are lit from the camera, as radiance.
+pub(crate) const AMBIENT: Vec3 = Vec3::splat(0.12);
+
+/// At most so many materials are named for each effect.
+const NAMED: usize = 6;
+
+/// The effects that the materials of visible geometry call for.
+pub(crate) fn call_for_materials(plan: &mut EffectPlan, scene: &SceneDesc) {
+    let mut used = vec![false; scene.materials.len()];
+    let mut default = false;
+    let mut colors = false;
+    for instance in &scene.instances {
+        for geometry in &scene.meshes[instance.mesh].geometries {
+            match geometry.material {
+                Some(m) => used[m] = true,
+                None => default = true,
+            }
+            colors |= matches!(&geometry.surface, SurfaceDesc::Triangles(mesh) if !mesh.colors.is_empty());
+        }
+    }
+    let mut calls: Vec<(EffectSet, String)> = scene
+        .materials
+        .iter()
+        .zip(used)
+        .enumerate()
+        .filter(|(_, (_, used))| *used)
+        .map(|(i, (m, _))| {
+            let name = if m.name.is_empty() { format!("material {i}") } else { format!("material '{}'", m.name) };
+            (effects_of(&m.model), name)
+        })
+        .collect();
+    if default {
+        calls.push((effects_of(&MaterialModel::Pbr(Box::default())), "the default material".into()));
+    }
+    if colors {
+        calls.push((EffectSet::VERTEX_COLORS, "meshes with vertex colours".into()));
+    }
+    for effect in EffectSet::all().iter() {
+        let mut by = calls.iter().filter(|(e, _)| e.contains(effect)).map(|(_, name)| name);
+        for name in by.by_ref().take(NAMED) {
+            plan.call(effect, name);
+        }
+        let more = by.count();
+        if more > 0 {
+            plan.call(effect, format!("{more} more"));
+        }
+    }
+}
+
+fn effects_of(model: &MaterialModel) -> EffectSet {
+    match model {
+        MaterialModel::Pbr(pbr) => effects_of_pbr(pbr),
+        MaterialModel::Diffuse { .. } => EffectSet::empty(),
+        MaterialModel::Mirror { .. } | MaterialModel::RoughMirror { .. } => EffectSet::REFLECTION,
+        MaterialModel::Glass { .. } | MaterialModel::RoughGlass { .. } => {
+            EffectSet::REFLECTION | EffectSet::REFRACTION
+        }
+        MaterialModel::Emission { radiance } if radiance.max_element() > 0.0 => {
+            EffectSet::EMISSION | EffectSet::AREA_LIGHTS
+        }
+        MaterialModel::Emission { .. } => EffectSet::empty(),
+    }
+}
+
+fn effects_of_pbr(m: &PbrMaterial) -> EffectSet {
+    let mut set = EffectSet::empty();
+    let textures = [
+        &m.base_color_texture,
+        &m.opacity_texture,
+        &m.metallic_texture,
+        &m.roughness_texture,
+        &m.emissive_texture,
+        &m.transmission_texture,
+        &m.specular_texture,
+        &m.specular_color_texture,
+    ];
+    set.set(EffectSet::TEXTURES, textures.iter().any(|t| t.is_some()));
+    match m.alpha_mode {
+        AlphaMode::Opaque => {}
+        AlphaMode::Mask { .. } => set |= EffectSet::ALPHA_MASK,
+        AlphaMode::Blend => set |= EffectSet::ALPHA_BLEND,
+    }
+    if m.unlit {
+        return set | EffectSet::UNLIT;
+    }
+    if m.normal_texture.is_some() || m.bump_texture.is_some() {
+        set |= EffectSet::TEXTURES | EffectSet::NORMAL_MAPS;
+    }
+    if m.emissive.max_element() > 0.0 {
+        set |= EffectSet::EMISSION | EffectSet::AREA_LIGHTS;
+    }
+    let smooth = m.roughness_texture.is_some() || m.roughness * m.roughness <= ROUGHEST_FOLLOWED;
+    let coated = m.specular > 0.0 && m.ior != 1.0 && smooth;
+    set.set(EffectSet::REFLECTION, m.metallic > 0.0 || coated);
+    if m.transmission > 0.0 {
+        if m.thickness > 0.0 {
+            set |= EffectSet::REFRACTION | EffectSet::REFLECTION;
+            set.set(EffectSet::ABSORPTION, m.attenuation_distance.is_finite() && m.attenuation_color != Vec3::ONE);
+        } else {
+            set |= EffectSet::TRANSMISSION;
+        }
+    }
+    set
+}
+
+/// The effects that lights call for.
+pub(crate) fn call_for_lights(
+    plan: &mut EffectPlan,
+    scene: &SceneDesc,
+    environment: Option<&Environment>,
+    name: &str,
+) {
+    let count = |of: fn(&LightKind) -> bool| scene.lights.iter().filter(|l| of(&l.kind)).count();
+    let kinds: [(EffectSet, &str, usize); 5] = [
+        (EffectSet::PUNCTUAL_LIGHTS, "point light", count(|k| matches!(k, LightKind::Point { .. }))),
+        (EffectSet::PUNCTUAL_LIGHTS, "spot light", count(|k| matches!(k, LightKind::Spot { .. }))),
+        (EffectSet::PUNCTUAL_LIGHTS, "directional light", count(|k| matches!(k, LightKind::Directional { .. }))),
+        (
+            EffectSet::AREA_LIGHTS | EffectSet::EMISSION,
+            "rectangle light",
+            count(|k| matches!(k, LightKind::Rectangle { .. })),
+        ),
+        (
+            EffectSet::AREA_LIGHTS | EffectSet::EMISSION,
+            "sphere light",
+            count(|k| matches!(k, LightKind::Sphere { .. })),
+        ),
+    ];
+    for (effects, name, n) in kinds {
+        if n > 0 {
+            let words = if n == 1 { format!("1 {name}") } else { format!("{n} {name}s") };
+            plan.call(effects | EffectSet::SHADOWS, words);
+        }
+    }
+    if environment.is_some_and(|e| !e.is_black()) {
+        plan.call(EffectSet::ENVIRONMENT | EffectSet::SHADOWS, name);
+    }
+    if plan.called_for().contains(EffectSet::AREA_LIGHTS) && !plan.called_for().contains(EffectSet::SHADOWS) {
+        plan.call(EffectSet::SHADOWS, "glowing surfaces");
+    }
+}
+
+/// A light at the camera, if nothing lights the scene, or only surroundings that hardly reach what is seen.
+pub(crate) fn headlight(
+    scene: &SceneDesc,
+    accel: &firsthit_accel::Scene,
+    camera: &Camera,
+    aspect: f64,
+    surrounded: bool,
+) -> Option<PunctualLight> {
+    /// With less of its hemisphere open to the surroundings a typical visible point counts as indoors.
+    const INDOORS: f64 = 0.2;
+    const ROWS: u32 = 18;
+    if setting::has_lights(scene) || !surrounded {
+        return None;
+    }
+    let columns = ((f64::from(ROWS) * aspect) as u32).clamp(1, 64);
+    let rays = camera.on_film(columns, ROWS);
+    let (mut distances, mut open) = (Vec::new(), 0.0);
+    for y in 0..ROWS {
+        for x in 0..columns {
+            let ray = rays.ray([f64::from(x) + 0.5, f64::from(y) + 0.5]);
+            let Some(hit) = accel.closest_hit(&ray) else { continue };
+            distances.push(hit.t * ray.direction.length());
+            let point = accel.surface_point(&ray, &hit);
+            let normal = if point.normal.dot(ray.direction) > 0.0 { -point.normal } else { point.normal };
+            let (tangent, bitangent) = warp::frame(normal.as_vec3());
+            let sampler = PixelSampler::new(0, (x, y), 0);
+            const LOOKS: u32 = 4;
+            for look in 0..LOOKS {
+                let w = warp::cosine_hemisphere(sampler.branch(look).get2(Dimension::Direction(0)));
+                let d = (tangent * w.x + bitangent * w.y).as_dvec3() + normal * f64::from(w.z);
+                let away = firsthit_geometry::Ray::new(point.spawn(d), d);
+                if !accel.any_hit_filtered(&away, Some(hit.id), |_| true) {
+                    open += 1.0 / f64::from(LOOKS);
+                }
+            }
+        }
+    }
+    // A few pixels of something are not an indoor scene.
+    if (distances.len() as u32) < columns * ROWS / 2 || open >= INDOORS * distances.len() as f64 {
+        return None;
+    }
+    distances.sort_unstable_by(f64::total_cmp);
+    let distance = distances[distances.len() / 2];
+    Some(PunctualLight::Headlight { position: camera.position(), irradiance: 2.5, distance })
+}
