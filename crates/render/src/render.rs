@@ -257,8 +257,7 @@ impl<'a> Job<'a> {
         let [dx, dy] = self.filter.offset(sampler.get2(Dimension::Pixel));
         let at = [f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy];
         let ray = self.camera.ray(at);
-        let screen =
-            [(at[0] / f64::from(self.options.width)) as f32, (at[1] / f64::from(self.options.height)) as f32];
+        let screen = [(at[0] / f64::from(self.options.width)) as f32, (at[1] / f64::from(self.options.height)) as f32];
         let mut seen = match self.method {
             Method::Light(follow) => {
                 let limits = Limits { bounces: self.options.max_depth, follow };

@@ -73,8 +73,7 @@ pub(crate) fn has_lights(scene: &SceneDesc) -> bool {
         _ => false,
     };
     let mut used = scene.instances.iter().flat_map(|i| &scene.meshes[i.mesh].geometries);
-    !scene.lights.is_empty()
-        || used.any(|g| g.material.is_some_and(|m| lamp(&scene.materials[m].model)))
+    !scene.lights.is_empty() || used.any(|g| g.material.is_some_and(|m| lamp(&scene.materials[m].model)))
 }
 
 fn from_desc(scene: &SceneDesc, desc: &EnvironmentDesc, turn: f32) -> Result<Option<Environment>, StageError> {

@@ -64,7 +64,10 @@ impl World {
             SurfaceDesc::Shape(shape) => {
                 let size = shape.bounds().extent().max_element() as f32;
                 // Shapes count v upwards, images downwards.
-                Part::Shape { uv: Vec2::new(u, 1.0 - v), uv_per_length: if size.is_finite() { 1.0 / size } else { 1.0 } }
+                Part::Shape {
+                    uv: Vec2::new(u, 1.0 - v),
+                    uv_per_length: if size.is_finite() { 1.0 / size } else { 1.0 },
+                }
             }
         }
     }

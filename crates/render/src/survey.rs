@@ -64,9 +64,7 @@ fn effects_of(model: &MaterialModel) -> EffectSet {
         MaterialModel::Pbr(pbr) => effects_of_pbr(pbr),
         MaterialModel::Diffuse { .. } => EffectSet::empty(),
         MaterialModel::Mirror { .. } | MaterialModel::RoughMirror { .. } => EffectSet::REFLECTION,
-        MaterialModel::Glass { .. } | MaterialModel::RoughGlass { .. } => {
-            EffectSet::REFLECTION | EffectSet::REFRACTION
-        }
+        MaterialModel::Glass { .. } | MaterialModel::RoughGlass { .. } => EffectSet::REFLECTION | EffectSet::REFRACTION,
         MaterialModel::Emission { radiance } if radiance.max_element() > 0.0 => {
             EffectSet::EMISSION | EffectSet::AREA_LIGHTS
         }
@@ -116,12 +114,7 @@ fn effects_of_pbr(m: &PbrMaterial) -> EffectSet {
 }
 
 /// The effects that lights call for.
-pub(crate) fn call_for_lights(
-    plan: &mut EffectPlan,
-    scene: &SceneDesc,
-    environment: Option<&Environment>,
-    name: &str,
-) {
+pub(crate) fn call_for_lights(plan: &mut EffectPlan, scene: &SceneDesc, environment: Option<&Environment>, name: &str) {
     let count = |of: fn(&LightKind) -> bool| scene.lights.iter().filter(|l| of(&l.kind)).count();
     let kinds: [(EffectSet, &str, usize); 5] = [
         (EffectSet::PUNCTUAL_LIGHTS, "point light", count(|k| matches!(k, LightKind::Point { .. }))),

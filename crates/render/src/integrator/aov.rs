@@ -100,13 +100,8 @@ fn distinct(id: u32) -> Vec3 {
 
 /// Black, blue, red, yellow, white: by the logarithm of the boxes and primitives tested, white from 1000 on.
 fn heat(cost: TraversalCounts) -> Vec3 {
-    const COLORS: [Vec3; 5] = [
-        Vec3::ZERO,
-        Vec3::new(0.05, 0.1, 0.7),
-        Vec3::new(0.8, 0.05, 0.05),
-        Vec3::new(1.0, 0.85, 0.1),
-        Vec3::ONE,
-    ];
+    const COLORS: [Vec3; 5] =
+        [Vec3::ZERO, Vec3::new(0.05, 0.1, 0.7), Vec3::new(0.8, 0.05, 0.05), Vec3::new(1.0, 0.85, 0.1), Vec3::ONE];
     let x = ((1.0 + (cost.boxes + cost.primitives) as f32).log10() / 3.0).clamp(0.0, 1.0) * 4.0;
     let i = (x as usize).min(3);
     COLORS[i].lerp(COLORS[i + 1], x - i as f32)

@@ -89,8 +89,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
             let (choice, u) = numbers(MESH);
             if let Some((mut sample, hit)) = light.sample(position, choice, u, lit.surface.id) {
                 let glow = stage.world.attributes(&hit, true);
-                sample.radiance *=
-                    stage.materials[stage.world.material(hit.id)].emission::<TEXTURES>(&glow);
+                sample.radiance *= stage.materials[stage.world.material(hit.id)].emission::<TEXTURES>(&glow);
                 total += self.arriving(lit, &sample, RayKind::ShadowArea);
             }
         }
@@ -142,9 +141,7 @@ pub(super) fn is_followed(lobe: &Lobe, kinds: LobeKind, reference: bool) -> bool
     kinds.contains(lobe.kind())
         && match lobe {
             Lobe::GgxReflection(ggx) => {
-                reference
-                    || ggx.alpha <= super::ROUGHEST_FOLLOWED
-                    || ggx.fresnel.reflectance(1.0).max_element() >= 0.2
+                reference || ggx.alpha <= super::ROUGHEST_FOLLOWED || ggx.fresnel.reflectance(1.0).max_element() >= 0.2
             }
             _ => true,
         }

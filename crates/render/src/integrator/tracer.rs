@@ -113,8 +113,7 @@ impl<'a, const TEXTURES: bool, const FILTERED: bool> Tracer<'a, TEXTURES, FILTER
                 let material = this.stage.world.material(hit.id);
                 !FILTERED
                     || !this.stage.flags[material].alpha
-                    || this.stage.materials[material]
-                        .coverage::<TEXTURES>(&this.stage.world.attributes(hit, true))
+                    || this.stage.materials[material].coverage::<TEXTURES>(&this.stage.world.attributes(hit, true))
                         > covers
             })
         })

@@ -14,15 +14,15 @@ use glam::{DVec3, Vec3};
 
 use super::direct::{Lit, is_followed};
 use super::{Tracer, aov};
+use crate::RayKind;
 use crate::camera::Cone;
-use crate::light::studio;
 use crate::light::power_heuristic;
+use crate::light::studio;
 use crate::material::lobes::{Lobe, LobeKind, LobeSample};
 use crate::material::{Material, Shading};
 use crate::sampler::{Dimension, PixelSampler};
 use crate::stage::Backdrop;
 use crate::surface::Surface;
-use crate::RayKind;
 
 /// Bounces at which a path splits instead of choosing.
 const SPLITS: u32 = 2;
@@ -112,9 +112,9 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
             if let Some((t, light)) = self.stage.lights.area.hit(&path.ray)
                 && hit.is_none_or(|h| t < h.t)
             {
-                seen.color += path.throughput * light.radiance * path.share_with_light(|c, d| {
-                    light.pdf(c.from, d, (path.ray.at(t) - c.from).length())
-                });
+                seen.color += path.throughput
+                    * light.radiance
+                    * path.share_with_light(|c, d| light.pdf(c.from, d, (path.ray.at(t) - c.from).length()));
                 continue;
             }
             let Some(hit) = hit else {
@@ -182,13 +182,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
         for (f, lobe) in followed.iter_mut().zip(shading.bsdf.lobes()) {
             *f = is_followed(lobe, limits.follow, stage.reference);
         }
-        let lit = Lit {
-            surface: &surface,
-            bsdf: &shading.bsdf,
-            followed,
-            sampler: path.sampler,
-            bounce: path.bounce,
-        };
+        let lit = Lit { surface: &surface, bsdf: &shading.bsdf, followed, sampler: path.sampler, bounce: path.bounce };
         let direct = self.direct(&lit) + shading.base_color * stage.lights.ambient;
         seen.color += path.throughput * direct;
         self.follow(&path, &surface, material, &shading, followed, hit.t, pending);
@@ -329,11 +323,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
             cone: Cone { width: path.cone.width + path.cone.spread * t, spread: path.cone.spread },
             absorption,
             straight: path.straight && unbent,
-            chosen: sample.pdf.map(|pdf| Chosen {
-                pdf,
-                from: surface.point.position,
-                normal: shading.bsdf.normal,
-            }),
+            chosen: sample.pdf.map(|pdf| Chosen { pdf, from: surface.point.position, normal: shading.bsdf.normal }),
             bright: if bounce <= ROULETTE { throughput.max_element() } else { path.bright },
         });
     }

@@ -182,13 +182,7 @@ pub(crate) struct MeshLight {
 impl MeshLight {
     /// A point on a glowing triangle as seen from `from`: radiance 1 is returned with the hit, for the caller to
     /// multiply with what the material there says. A triangle does not light itself.
-    pub(crate) fn sample(
-        &self,
-        from: DVec3,
-        choice: f32,
-        u: [f32; 2],
-        receiver: HitId,
-    ) -> Option<(LightSample, Hit)> {
+    pub(crate) fn sample(&self, from: DVec3, choice: f32, u: [f32; 2], receiver: HitId) -> Option<(LightSample, Hit)> {
         let (i, _) = self.table.sample(choice);
         let triangle = &self.triangles[i];
         if triangle.id == receiver {
@@ -198,8 +192,7 @@ impl MeshLight {
         let [p, q, r] = triangle.corners;
         let at = p * f64::from(a) + q * f64::from(b) + r * f64::from(c);
         let area = triangle.area / f64::from(self.table.probability(i));
-        let sample =
-            from_surface(from, at, triangle.normal, area, Vec3::ONE, triangle.both_sides, Some(triangle.id))?;
+        let sample = from_surface(from, at, triangle.normal, area, Vec3::ONE, triangle.both_sides, Some(triangle.id))?;
         Some((sample, Hit { id: triangle.id, t: 1.0, u: b, v: c, normal: triangle.normal }))
     }
 
@@ -255,12 +248,10 @@ impl AreaLights {
                             weights.push(area as f32 * glow);
                         }
                     }
-                    SurfaceDesc::Shape(shape) => {
-                        match ShapeLight::of_scene(world, id, shape, radiance(id, 0.5, 0.5)) {
-                            Some(light) => area.shapes.push(light),
-                            None => area.unsampled += 1,
-                        }
-                    }
+                    SurfaceDesc::Shape(shape) => match ShapeLight::of_scene(world, id, shape, radiance(id, 0.5, 0.5)) {
+                        Some(light) => area.shapes.push(light),
+                        None => area.unsampled += 1,
+                    },
                 }
             }
         }
@@ -272,14 +263,6 @@ impl AreaLights {
         }
         area.mesh = Distribution1D::new(&weights).map(|table| MeshLight { triangles, table, first });
         area
-    }
-
-    pub(crate) fn is_empty(&self) -> bool {
-        self.shapes.is_empty() && self.mesh.is_none()
-    }
-
-    pub(crate) fn triangles(&self) -> usize {
-        self.mesh.as_ref().map_or(0, |m| m.triangles.len())
     }
 
     /// The nearest light of its own (not part of the scene's trees) in a ray's way.

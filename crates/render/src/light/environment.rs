@@ -93,6 +93,12 @@ impl Environment {
         Self { source: Source::Map(Arc::new(map)), turn: turn(rotation), scale }
     }
 
+    /// Whether the same comes from everywhere.
+    #[must_use]
+    pub fn is_constant(&self) -> bool {
+        matches!(self.source, Source::Constant)
+    }
+
     /// Whether no light comes from anywhere.
     #[must_use]
     pub fn is_black(&self) -> bool {

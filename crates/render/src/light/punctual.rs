@@ -181,12 +181,9 @@ mod tests {
 
     #[test]
     fn a_sun_with_an_angle_stays_within_its_disk() {
-        let light = PunctualLight::new(&LightKind::Directional {
-            direction: DVec3::NEG_Y,
-            irradiance: Vec3::ONE,
-            angle: 0.1,
-        })
-        .unwrap();
+        let light =
+            PunctualLight::new(&LightKind::Directional { direction: DVec3::NEG_Y, irradiance: Vec3::ONE, angle: 0.1 })
+                .unwrap();
         for k in 0..100 {
             let u = [k as f32 / 100.0, (k * 37 % 100) as f32 / 100.0];
             let s = light.sample(DVec3::ZERO, u).unwrap();

@@ -101,8 +101,7 @@ impl Material {
         textures: &mut Textures<'_>,
         conventions: Conventions,
     ) -> Result<Self, StageError> {
-        let mut material =
-            Self { model: Model::Glass, conventions, absorption: Vec3::ZERO, solid: false, ior: 1.0 };
+        let mut material = Self { model: Model::Glass, conventions, absorption: Vec3::ZERO, solid: false, ior: 1.0 };
         material.model = match &desc.model {
             MaterialModel::Pbr(desc) => {
                 let pbr = Pbr::new(desc, textures, conventions)?;

@@ -79,14 +79,10 @@ impl Pbr {
     ) -> Result<Self, StageError> {
         let has = |effect| conventions.effects.contains(effect);
         let textured = has(EffectSet::TEXTURES);
-        let mut get = |texture: &Option<_>, space, wanted: bool| {
-            textures.get(texture.as_ref().filter(|_| wanted), space)
-        };
-        let transmission = if has(EffectSet::REFRACTION) || has(EffectSet::TRANSMISSION) {
-            desc.transmission
-        } else {
-            0.0
-        };
+        let mut get =
+            |texture: &Option<_>, space, wanted: bool| textures.get(texture.as_ref().filter(|_| wanted), space);
+        let transmission =
+            if has(EffectSet::REFRACTION) || has(EffectSet::TRANSMISSION) { desc.transmission } else { 0.0 };
         Ok(Self {
             base_color: desc.base_color,
             base_color_texture: get(&desc.base_color_texture, ColorSpace::Srgb, textured)?,
@@ -95,11 +91,7 @@ impl Pbr {
             metallic_texture: get(&desc.metallic_texture, ColorSpace::Linear, textured)?,
             roughness: desc.roughness,
             roughness_texture: get(&desc.roughness_texture, ColorSpace::Linear, textured)?,
-            normal_texture: get(
-                &desc.normal_texture,
-                ColorSpace::Linear,
-                textured && has(EffectSet::NORMAL_MAPS),
-            )?,
+            normal_texture: get(&desc.normal_texture, ColorSpace::Linear, textured && has(EffectSet::NORMAL_MAPS))?,
             normal_scale: desc.normal_scale,
             bump_texture: get(&desc.bump_texture, ColorSpace::Linear, textured && has(EffectSet::NORMAL_MAPS))?,
             bump_scale: desc.bump_scale,
@@ -197,11 +189,9 @@ impl Pbr {
             normal = surface.bent(normal);
         }
         let metallic = (self.metallic * scalar::<TEXTURES>(self.metallic_texture.as_ref(), surface)).clamp(0.0, 1.0);
-        let roughness =
-            (self.roughness * scalar::<TEXTURES>(self.roughness_texture.as_ref(), surface)).clamp(0.0, 1.0);
-        let transmission = (self.transmission
-            * scalar::<TEXTURES>(self.transmission_texture.as_ref(), surface))
-        .clamp(0.0, 1.0);
+        let roughness = (self.roughness * scalar::<TEXTURES>(self.roughness_texture.as_ref(), surface)).clamp(0.0, 1.0);
+        let transmission =
+            (self.transmission * scalar::<TEXTURES>(self.transmission_texture.as_ref(), surface)).clamp(0.0, 1.0);
         let alpha = (roughness * roughness).max(LEAST_ALPHA);
         let ior = if self.ior > 0.0 { self.ior } else { 1.0 };
         let eta = match (self.is_solid(), surface.front) {
@@ -256,10 +246,8 @@ impl Pbr {
             let step = t.texel_step().max(width);
             let height = |du, dv| t.scalar(uv + glam::Vec2::new(du, dv), width);
             let half = 0.5 * step;
-            let slope = glam::Vec2::new(
-                height(half, 0.0) - height(-half, 0.0),
-                height(0.0, half) - height(0.0, -half),
-            ) * (self.bump_scale / step);
+            let slope = glam::Vec2::new(height(half, 0.0) - height(-half, 0.0), height(0.0, half) - height(0.0, -half))
+                * (self.bump_scale / step);
             if slope.is_finite() && slope != glam::Vec2::ZERO {
                 normal = surface.tilted(normal.unwrap_or(surface.smooth), slope, t.uv_set());
             }
