@@ -23,12 +23,30 @@
 //! # Ok::<(), firsthit_accel::BuildError>(())
 //! ```
 
+#![forbid(unsafe_code)]
+
+mod build;
 mod build_options;
+mod builder;
 mod error;
 mod hit;
+mod instance;
+mod kernel;
+mod layout;
+mod local;
+mod model;
+mod query;
+pub mod reference;
 mod scene;
+mod stats;
+mod surface_point;
+mod traverse;
+mod visit_order;
 
 pub use build_options::{BuildOptions, BuildQuality, Layout};
+pub use builder::{Geometry, SceneBuilder};
 pub use error::BuildError;
 pub use hit::{Hit, HitId, SurfacePoint, TraversalCounts};
-pub use scene::{Geometry, Scene, SceneBuilder, SceneStats};
+pub use scene::{Scene, SceneStats};
+#[doc(hidden)]
+pub use visit_order::VisitOrder;

@@ -1,86 +1,22 @@
 //! The scene: built once, then only asked.
 
+use core::ops::ControlFlow;
 use std::sync::Arc;
 
-use firsthit_geometry::{Aabb, Primitive, Ray, Shape};
-use glam::{DAffine3, DVec3, Vec3};
+use firsthit_geometry::{Aabb, Precision, Ray, Real, slab::Slabs, triangle};
+use glam::{DAffine3, DVec3};
+use rayon::prelude::*;
 
-use crate::{BuildError, BuildOptions, Hit, HitId, SurfacePoint, TraversalCounts};
-
-/// A part of a mesh.
-#[derive(Clone, Debug)]
-pub enum Geometry {
-    /// Indexed triangles.
-    Triangles {
-        /// Vertex positions in the mesh's space.
-        positions: Vec<Vec3>,
-        /// Vertices of each triangle.
-        triangles: Vec<[u32; 3]>,
-    },
-    /// An analytic shape.
-    Shape(Shape<f64>),
-}
-
-/// Gathers meshes and instances, then builds.
-#[derive(Clone, Debug, Default)]
-pub struct SceneBuilder {
-    options: BuildOptions,
-    meshes: Vec<Vec<Geometry>>,
-    instances: Vec<(usize, DAffine3)>,
-}
-
-impl SceneBuilder {
-    /// An empty scene with these options.
-    #[must_use]
-    pub fn new(options: BuildOptions) -> Self {
-        Self { options, ..Self::default() }
-    }
-
-    /// A builder filled from a file's content: mesh and instance indices are those of the description.
-    #[cfg(feature = "import")]
-    #[must_use]
-    pub fn from_desc(desc: &firsthit_import::SceneDesc, options: BuildOptions) -> Self {
-        use firsthit_import::scene::SurfaceDesc;
-        let mut builder = Self::new(options);
-        for mesh in &desc.meshes {
-            builder.add_mesh(
-                mesh.geometries
-                    .iter()
-                    .map(|g| match &g.surface {
-                        SurfaceDesc::Triangles(m) => {
-                            Geometry::Triangles { positions: m.positions.clone(), triangles: m.triangles.clone() }
-                        }
-                        SurfaceDesc::Shape(s) => Geometry::Shape(s.clone()),
-                    })
-                    .collect(),
-            );
-        }
-        for i in &desc.instances {
-            builder.add_instance(i.mesh, i.transform);
-        }
-        builder
-    }
-
-    /// Adds a mesh; the answer is its index, for [`SceneBuilder::add_instance`].
-    pub fn add_mesh(&mut self, geometries: Vec<Geometry>) -> usize {
-        self.meshes.push(geometries);
-        self.meshes.len() - 1
-    }
-
-    /// Places a mesh in the world; the answer is the `instance` of its hits.
-    pub fn add_instance(&mut self, mesh: usize, transform: DAffine3) -> usize {
-        self.instances.push((mesh, transform));
-        self.instances.len() - 1
-    }
-
-    /// Builds one tree for each mesh and one over the instances.
-    ///
-    /// # Errors
-    /// When a vertex, index or transform is unusable: see [`BuildError`].
-    pub fn build(self) -> Result<Scene, BuildError> {
-        Ok(Scene { inner: Arc::new(self) })
-    }
-}
+use crate::build::Topology;
+use crate::instance::{Instance, tight_boxes};
+use crate::kernel::{Double, Fast, Kernel, Robust};
+use crate::layout::Bvh2;
+use crate::local::LocalRay;
+use crate::model::{Model, PrimitiveId, Surface, limit};
+use crate::query::{Any, Closest, Collector};
+use crate::stats::{Off, Probe};
+use crate::traverse::traverse;
+use crate::{BuildError, BuildOptions, Geometry, Hit, HitId, TraversalCounts};
 
 /// What a scene's trees are like.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -104,10 +40,67 @@ pub struct SceneStats {
 /// Meshes, shapes and instances with their trees. Immutable, `Send + Sync`, cheap to clone.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    inner: Arc<SceneBuilder>,
+    inner: Arc<Inner>,
+}
+
+#[derive(Debug)]
+struct Inner {
+    options: BuildOptions,
+    models: Vec<Model>,
+    instances: Vec<Instance>,
+    /// Over the instances with something bounded in them.
+    tree: Bvh2<f64>,
+    /// Instances in the order of the tree's leaves.
+    order: Vec<u32>,
+    /// Instances of models with shapes of no finite box, which are tested outside the tree.
+    unbounded: Vec<u32>,
+    bounds: Aabb<f64>,
+    stats: SceneStats,
 }
 
 impl Scene {
+    pub(crate) fn new(
+        options: BuildOptions,
+        meshes: &[Vec<Geometry>],
+        placed: &[(usize, DAffine3)],
+    ) -> Result<Self, BuildError> {
+        limit("meshes", meshes.len() as u64)?;
+        limit("instances", placed.len() as u64)?;
+        let models: Vec<Model> =
+            meshes.par_iter().enumerate().map(|(i, m)| Model::new(i, m, options)).collect::<Result<_, _>>()?;
+        let instances: Vec<Instance> = placed
+            .iter()
+            .enumerate()
+            .map(|(i, &(mesh, transform))| {
+                let model =
+                    models.get(mesh).ok_or(BuildError::NoSuchMesh { instance: i, mesh, count: models.len() })?;
+                Instance::new(i, mesh, model.scale(), transform)
+            })
+            .collect::<Result<_, _>>()?;
+
+        let tight = tight_boxes(&instances, &models);
+        let bounds = tight.iter().fold(Aabb::empty(), |a, b| a.union(*b));
+        let bounded: Vec<u32> = (0..instances.len() as u32).filter(|&i| !tight[i as usize].is_empty()).collect();
+        let boxes: Vec<Aabb<f64>> = bounded
+            .iter()
+            .map(|&i| {
+                let instance = &instances[i as usize];
+                instance.padded_box(&models[instance.model as usize], &tight[i as usize])
+            })
+            .collect();
+        let topology = Topology::new(&relative(&boxes), options.quality);
+        let tree = Bvh2::new(&topology, &boxes);
+        let unbounded = (0..instances.len() as u32)
+            .filter(|&i| models[instances[i as usize].model as usize].has_unbounded())
+            .collect();
+        let order = topology.order.iter().map(|&i| bounded[i as usize]).collect();
+
+        let mut inner =
+            Inner { options, models, instances, tree, order, unbounded, bounds, stats: SceneStats::default() };
+        inner.stats = inner.stats(topology.depth());
+        Ok(Self { inner: Arc::new(inner) })
+    }
+
     /// The nearest hit in the ray's closed interval; `None` also for an invalid ray.
     #[must_use]
     pub fn closest_hit(&self, ray: &Ray<f64>) -> Option<Hit> {
@@ -117,23 +110,17 @@ impl Scene {
     /// The nearest hit that `accept` accepts, other than on the flat primitive `source` that the ray starts from.
     ///
     /// `accept` is asked about candidates in any order, and not about all of them. Their normal is not filled in.
+    ///
+    /// A curved shape is never skipped, since a ray may well meet it again: [`crate::SurfacePoint::spawn`] sees to it
+    /// that the ray does not start behind its own surface.
     #[must_use]
     pub fn closest_hit_filtered(
         &self,
         ray: &Ray<f64>,
         source: Option<HitId>,
-        mut accept: impl FnMut(&Hit) -> bool,
+        accept: impl FnMut(&Hit) -> bool,
     ) -> Option<Hit> {
-        let mut best: Option<Hit> = None;
-        self.each_hit(ray, &mut |hit| {
-            if Some(hit.id) != source
-                && best.is_none_or(|b| hit.t < b.t || (hit.t == b.t && hit.id < b.id))
-                && accept(&hit)
-            {
-                best = Some(hit);
-            }
-        });
-        best
+        self.closest(ray, source, accept, &mut Off)
     }
 
     /// Whether anything lies in the ray's closed interval: true exactly when [`Scene::closest_hit`] finds something.
@@ -145,100 +132,156 @@ impl Scene {
     /// As [`Scene::any_hit`] with a filter: see [`Scene::closest_hit_filtered`]. A filter that always says no is asked
     /// about every hit exactly once.
     #[must_use]
-    pub fn any_hit_filtered(
-        &self,
-        ray: &Ray<f64>,
-        source: Option<HitId>,
-        mut accept: impl FnMut(&Hit) -> bool,
-    ) -> bool {
-        let mut any = false;
-        self.each_hit(ray, &mut |hit| {
-            any = any || (Some(hit.id) != source && accept(&hit));
-        });
-        any
+    pub fn any_hit_filtered(&self, ray: &Ray<f64>, source: Option<HitId>, accept: impl FnMut(&Hit) -> bool) -> bool {
+        let mut any = Any { t_min: ray.t_min, t_max: ray.t_max, source: self.flat(source), accept };
+        self.inner.trace(ray, &mut any, &mut Off).is_break()
     }
 
     /// As [`Scene::closest_hit`], with what it cost.
     #[must_use]
     pub fn closest_hit_counted(&self, ray: &Ray<f64>) -> (Option<Hit>, TraversalCounts) {
-        (self.closest_hit(ray), TraversalCounts::default())
-    }
-
-    /// Where exactly a hit is, for starting other rays there. `ray` is the ray that found it.
-    #[must_use]
-    pub fn surface_point(&self, ray: &Ray<f64>, hit: &Hit) -> SurfacePoint {
-        let position = ray.at(hit.t);
-        let error = 1e-5 * (1.0 + position.abs().max_element());
-        SurfacePoint { position, normal: hit.normal, error }
+        let mut counts = TraversalCounts::default();
+        let hit = self.closest(ray, None, |_| true, &mut counts);
+        (hit, counts)
     }
 
     /// A box around everything that is bounded (infinite planes do not count); empty for an empty scene.
     #[must_use]
     pub fn bounds(&self) -> Aabb<f64> {
-        let mut b = Aabb::empty();
-        for (mesh, m) in &self.inner.instances {
-            for g in &self.inner.meshes[*mesh] {
-                match g {
-                    Geometry::Triangles { positions, .. } => {
-                        for p in positions {
-                            b = b.with_point(m.transform_point3(p.as_dvec3()));
-                        }
-                    }
-                    Geometry::Shape(s) => {
-                        let sb = s.bounds();
-                        if sb.is_finite() {
-                            for c in sb.corners() {
-                                b = b.with_point(m.transform_point3(c));
-                            }
-                        }
-                    }
-                }
-            }
-        }
-        b
+        self.inner.bounds
     }
 
     /// What the trees are like.
     #[must_use]
     pub fn stats(&self) -> SceneStats {
-        SceneStats::default()
+        self.inner.stats
     }
 
-    fn each_hit(&self, ray: &Ray<f64>, found: &mut dyn FnMut(Hit)) {
-        for (i, (mesh, m)) in self.inner.instances.iter().enumerate() {
-            let inv = m.inverse();
-            let local = Ray {
-                origin: inv.transform_point3(ray.origin),
-                direction: inv.transform_vector3(ray.direction),
-                ..*ray
-            };
-            let n_mat = inv.matrix3.transpose();
-            for (g, geometry) in self.inner.meshes[*mesh].iter().enumerate() {
-                let id = |primitive| HitId { instance: i as u32, geometry: g as u32, primitive };
-                match geometry {
-                    Geometry::Triangles { positions, triangles } => {
-                        for (k, tri) in triangles.iter().enumerate() {
-                            let v: [DVec3; 3] = tri.map(|i| positions[i as usize].as_dvec3());
-                            let (e1, e2) = (v[1] - v[0], v[2] - v[0]);
-                            let p = local.direction.cross(e2);
-                            let det = e1.dot(p);
-                            let s = local.origin - v[0];
-                            let (u, q) = (s.dot(p) / det, s.cross(e1));
-                            let (w, t) = (local.direction.dot(q) / det, e2.dot(q) / det);
-                            if u >= 0.0 && w >= 0.0 && u + w <= 1.0 && ray.contains(t) {
-                                let normal = (n_mat * e1.cross(e2)).normalize_or_zero();
-                                found(Hit { id: id(k as u32), t, u: u as f32, v: w as f32, normal });
-                            }
-                        }
-                    }
-                    Geometry::Shape(s) => {
-                        if let Some(h) = s.closest_hit(&local) {
-                            let normal = h.normal.map_or(DVec3::ZERO, |n| (n_mat * n).normalize_or_zero());
-                            found(Hit { id: id(0), t: h.t, u: h.u as f32, v: h.v as f32, normal });
-                        }
-                    }
-                }
+    /// How the scene was built.
+    #[must_use]
+    pub fn options(&self) -> BuildOptions {
+        self.inner.options
+    }
+
+    pub(crate) fn models(&self) -> &[Model] {
+        &self.inner.models
+    }
+
+    pub(crate) fn instances(&self) -> &[Instance] {
+        &self.inner.instances
+    }
+
+    pub(crate) fn closest<P: Probe>(
+        &self,
+        ray: &Ray<f64>,
+        source: Option<HitId>,
+        accept: impl FnMut(&Hit) -> bool,
+        probe: &mut P,
+    ) -> Option<Hit> {
+        let mut closest = Closest { t_min: ray.t_min, t_max: ray.t_max, source: self.flat(source), accept, best: None };
+        // It never breaks: the nearest hit is known at the end only.
+        let _ = self.inner.trace(ray, &mut closest, probe);
+        closest.best.map(|hit| Hit { normal: self.world_normal(&hit), ..hit })
+    }
+
+    /// The primitive to skip: only what a straight ray cannot meet twice.
+    #[inline(always)]
+    fn flat(&self, source: Option<HitId>) -> Option<HitId> {
+        source.filter(|id| match self.surface(id) {
+            Some((_, Surface::Triangle(_))) => true,
+            Some((_, Surface::Shape(s))) => s.is_flat(),
+            None => false,
+        })
+    }
+
+    pub(crate) fn surface(&self, id: &HitId) -> Option<(&Instance, Surface<'_>)> {
+        let instance = self.inner.instances.get(id.instance as usize)?;
+        let model = self.inner.models.get(instance.model as usize)?;
+        let surface = model.surface(PrimitiveId { geometry: id.geometry, primitive: id.primitive })?;
+        Some((instance, surface))
+    }
+
+    fn world_normal(&self, hit: &Hit) -> DVec3 {
+        match self.surface(&hit.id) {
+            Some((instance, Surface::Triangle(v))) => {
+                triangle::normal(v).map_or(DVec3::ZERO, |n| instance.transform.normal(n))
             }
+            Some((instance, Surface::Shape(_))) => instance.transform.normal(hit.normal),
+            None => DVec3::ZERO,
         }
     }
+}
+
+impl Inner {
+    /// Offers hits to the collector, by the tests of the scene's tier.
+    #[inline]
+    fn trace<C: Collector, P: Probe>(&self, ray: &Ray<f64>, collector: &mut C, probe: &mut P) -> ControlFlow<()> {
+        if !ray.is_valid() {
+            return ControlFlow::Continue(());
+        }
+        match self.options.precision {
+            Precision::Fast => self.trace_by::<Fast, C, P>(ray, collector, probe),
+            Precision::Robust => self.trace_by::<Robust, C, P>(ray, collector, probe),
+            Precision::Double => self.trace_by::<Double, C, P>(ray, collector, probe),
+        }
+    }
+
+    fn trace_by<K: Kernel, C: Collector, P: Probe>(
+        &self,
+        ray: &Ray<f64>,
+        collector: &mut C,
+        probe: &mut P,
+    ) -> ControlFlow<()> {
+        let precision = self.options.precision;
+        for &i in &self.unbounded {
+            let instance = &self.instances[i as usize];
+            let model = &self.models[instance.model as usize];
+            if let Some(local) = LocalRay::enter(ray, &instance.transform, model.bounds()) {
+                model.trace_unbounded(&local, i, precision, collector)?;
+            }
+        }
+        let slabs = Slabs::new(ray.origin, ray.direction);
+        // A distance in the world has gone through an instance and back: a few roundings more than a box's entry.
+        let beyond = |t: f64| t + t.abs() * (64.0 * f64::UNIT_ROUNDOFF);
+        let before = ray.t_min - ray.t_min.abs() * (64.0 * f64::UNIT_ROUNDOFF);
+        let t_max = beyond(collector.t_max());
+        traverse(&self.tree, &slabs, before, t_max, probe, |range, probe| {
+            for &i in &self.order[range] {
+                let instance = &self.instances[i as usize];
+                let model = &self.models[instance.model as usize];
+                if let Some(local) = LocalRay::enter(ray, &instance.transform, model.bounds()) {
+                    model.trace::<K, C, P>(&local, i, precision, collector, probe)?;
+                }
+            }
+            ControlFlow::Continue(beyond(collector.t_max()))
+        })
+    }
+
+    fn stats(&self, depth: u32) -> SceneStats {
+        let stored = |m: &Model| m.triangle_count();
+        let weight: u64 = self.models.iter().map(stored).sum();
+        let cost: f64 = self.models.iter().map(|m| m.sah_cost() * m.triangle_count() as f64).sum();
+        let models: usize = self.models.iter().map(Model::bytes).sum();
+        SceneStats {
+            stored_triangles: weight,
+            instanced_triangles: self.instances.iter().map(|i| stored(&self.models[i.model as usize])).sum(),
+            instances: self.instances.len() as u64,
+            sah_cost: if weight > 0 { cost / weight as f64 } else { 0.0 },
+            depth: depth + self.models.iter().map(Model::depth).max().unwrap_or(0),
+            bytes: (models + self.tree.bytes() + size_of_val(self.instances.as_slice())) as u64,
+            degenerate_triangles: self.models.iter().map(Model::degenerate).sum(),
+        }
+    }
+}
+
+/// Boxes as the builder wants them: f32, about the middle of all and of size near 1. Only the tree's shape comes from
+/// them, so their rounding does not matter.
+fn relative(boxes: &[Aabb<f64>]) -> Vec<Aabb<f32>> {
+    let all = boxes.iter().fold(Aabb::empty(), |a, b| a.union(*b));
+    if all.is_empty() {
+        return Vec::new();
+    }
+    let center = all.center();
+    let scale = 1.0 / all.extent().max_element().power_of_two_below();
+    boxes.iter().map(|b| Aabb::new((b.min - center) * scale, (b.max - center) * scale).to_f32_outward()).collect()
 }

@@ -13,7 +13,7 @@ use crate::{Real, Vector3};
 /// ```
 /// use firsthit_geometry::offset::leave;
 /// use glam::DVec3;
-/// let p = leave(DVec3::ZERO, DVec3::splat(1e-9), DVec3::Z, DVec3::new(1.0, 0.0, 0.1));
+/// let p = leave::<f64>(DVec3::ZERO, DVec3::splat(1e-9), DVec3::Z, DVec3::new(1.0, 0.0, 0.1));
 /// assert!(p.z >= 1e-9 && p.z < 1.1e-9 && p.x == 0.0);
 /// ```
 #[must_use]

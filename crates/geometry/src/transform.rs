@@ -81,6 +81,12 @@ impl Transform {
         self.linear
     }
 
+    /// The inverse of the linear part.
+    #[must_use]
+    pub fn inverse_linear(&self) -> DMat3 {
+        self.inverse
+    }
+
     /// Where the object's origin lies in the world.
     #[must_use]
     pub fn translation(&self) -> DVec3 {

@@ -13,9 +13,10 @@ pub fn fast<R: Real>(vertices: [R::Vec3; 3], ray: &Ray<R>) -> Option<TriangleHit
     (ray.is_valid() && ray.contains(hit.t)).then_some(hit)
 }
 
-/// The same without the interval; `t` may be anything finite.
+/// The same for a finite ray without an interval; `t` may be anything finite.
 #[inline(always)]
-fn moeller_trumbore<R: Real>(v: [R::Vec3; 3], origin: R::Vec3, direction: R::Vec3) -> Option<TriangleHit<R>> {
+#[must_use]
+pub fn moeller_trumbore<R: Real>(v: [R::Vec3; 3], origin: R::Vec3, direction: R::Vec3) -> Option<TriangleHit<R>> {
     let (e1, e2) = (v[1] - v[0], v[2] - v[0]);
     let p = direction.cross(e2);
     let det = e1.dot(p);

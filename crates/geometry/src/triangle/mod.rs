@@ -7,7 +7,7 @@
 mod fast;
 mod watertight;
 
-pub use fast::fast;
+pub use fast::{fast, moeller_trumbore};
 pub use watertight::{Shear, Weights, watertight};
 
 use glam::DVec3;

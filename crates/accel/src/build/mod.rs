@@ -1,0 +1,144 @@
+//! From boxes to the shape of a tree.
+//!
+//! obvhs clusters and optimises (PLOC, parallel reinsertion, leaf collapse). What it cannot take is taken out first
+//! ([`cluster`]), and its answer is copied into a [`Topology`] of bounded depth. No type of obvhs leaves this module.
+
+mod balanced;
+mod cluster;
+mod emit;
+
+use firsthit_geometry::Aabb;
+use obvhs::{BvhBuildParams, bvh2::builder::build_bvh2};
+
+use crate::BuildQuality;
+
+/// No tree is deeper than this, so a traversal stack of this size never overflows.
+pub(crate) const MAX_DEPTH: u32 = 64;
+
+/// What lies below: an inner node, or a run of primitives.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Child {
+    /// Index of the inner node, or position of the first primitive.
+    pub(crate) first: u32,
+    /// Number of primitives; 0 for an inner node.
+    pub(crate) count: u32,
+}
+
+impl Child {
+    pub(crate) fn inner(index: usize) -> Self {
+        Self { first: index as u32, count: 0 }
+    }
+    #[inline(always)]
+    pub(crate) fn is_leaf(self) -> bool {
+        self.count > 0
+    }
+    #[inline(always)]
+    pub(crate) fn range(self) -> core::ops::Range<usize> {
+        self.first as usize..(self.first + self.count) as usize
+    }
+}
+
+/// A binary tree without its boxes: what every layout is made from.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Topology {
+    /// The root; `None` when there is nothing.
+    pub(crate) root: Option<Child>,
+    /// Children of each inner node. A node's children have higher indices than it.
+    pub(crate) nodes: Vec<[Child; 2]>,
+    /// Which primitive is at each position of the leaves' runs.
+    pub(crate) order: Vec<u32>,
+}
+
+impl Topology {
+    /// A tree over finite boxes, at most `u32::MAX / 2` of them, none empty.
+    pub(crate) fn new(boxes: &[Aabb<f32>], quality: BuildQuality) -> Self {
+        let clusters = cluster::find(boxes);
+        let items: Vec<obvhs::aabb::Aabb> = clusters
+            .loose
+            .iter()
+            .map(|&i| boxes[i as usize])
+            .chain(
+                clusters.groups.iter().map(|g| g.iter().map(|&i| boxes[i as usize]).fold(Aabb::empty(), Aabb::union)),
+            )
+            .map(|b| obvhs::aabb::Aabb::new(b.min.into(), b.max.into()))
+            .collect();
+        let bvh = build_bvh2(&items, parameters(quality), &mut core::time::Duration::default());
+        emit::bounded(emit::copy(&bvh, &clusters, boxes), boxes)
+    }
+
+    /// Nodes on the longest way from the root to a leaf.
+    pub(crate) fn depth(&self) -> u32 {
+        let mut depths = vec![1; self.nodes.len()];
+        let mut deepest = u32::from(self.root.is_some());
+        for (i, children) in self.nodes.iter().enumerate() {
+            for c in children {
+                deepest = deepest.max(depths[i] + 1);
+                if !c.is_leaf() {
+                    depths[c.first as usize] = depths[i] + 1;
+                }
+            }
+        }
+        deepest
+    }
+}
+
+fn parameters(quality: BuildQuality) -> BvhBuildParams {
+    match quality {
+        BuildQuality::Fast => BvhBuildParams::fast_build(),
+        BuildQuality::Balanced => BvhBuildParams::medium_build(),
+        // Without the splits of that preset: a primitive lies in one leaf, so every hit is found once.
+        BuildQuality::High => BvhBuildParams { pre_split: false, ..BvhBuildParams::very_slow_build() },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+
+    /// Every primitive is in exactly one leaf, indices grow downwards, and the depth is bounded.
+    fn check(boxes: &[Aabb<f32>], quality: BuildQuality) -> Topology {
+        let t = Topology::new(boxes, quality);
+        let mut seen = t.order.clone();
+        seen.sort_unstable();
+        assert_eq!(seen, (0..boxes.len() as u32).collect::<Vec<_>>());
+        let mut covered = 0;
+        for (i, children) in t.nodes.iter().enumerate() {
+            for c in children {
+                covered += c.count;
+                assert!(c.is_leaf() || c.first as usize > i);
+            }
+        }
+        if !t.nodes.is_empty() {
+            assert_eq!(covered as usize, boxes.len());
+        }
+        assert!(t.depth() <= MAX_DEPTH, "depth {}", t.depth());
+        t
+    }
+
+    fn cube(center: Vec3, half: f32) -> Aabb<f32> {
+        Aabb::new(center - half, center + half)
+    }
+
+    #[test]
+    fn few() {
+        for n in 0..20 {
+            let boxes: Vec<_> = (0..n).map(|i| cube(Vec3::X * i as f32, 0.4)).collect();
+            for q in [BuildQuality::Fast, BuildQuality::Balanced, BuildQuality::High] {
+                check(&boxes, q);
+            }
+        }
+    }
+
+    #[test]
+    fn coincident_concentric_and_geometric() {
+        let n = 20_000;
+        check(&vec![cube(Vec3::ONE, 0.5); n], BuildQuality::Balanced);
+        let concentric: Vec<_> = (0..n).map(|i| cube(Vec3::ZERO, 1.0 + i as f32)).collect();
+        check(&concentric, BuildQuality::Balanced);
+        let series: Vec<_> = (0..120).map(|i| cube(Vec3::X * 2.0f32.powi(-i), 2.0f32.powi(-i - 2))).collect();
+        check(&series, BuildQuality::Balanced);
+        let nearly: Vec<_> = (0..n).map(|i| cube(Vec3::splat(i as f32 * 1e-9), 1.0 + i as f32 / n as f32)).collect();
+        check(&nearly, BuildQuality::Balanced);
+    }
+}

@@ -1,0 +1,54 @@
+//! Meshes placed in the world.
+
+use firsthit_geometry::{Aabb, transform::Transform};
+use glam::{DAffine3, DVec3};
+use rayon::prelude::*;
+
+use crate::BuildError;
+use crate::local::instance_padding;
+use crate::model::Model;
+
+/// A placed mesh.
+#[derive(Clone, Debug)]
+pub(crate) struct Instance {
+    /// Index of its model.
+    pub(crate) model: u32,
+    /// From the model's normalised space to the world.
+    pub(crate) transform: Transform,
+}
+
+/// So many vertices at most are transformed for tight boxes.
+const TIGHT: u64 = 1 << 24;
+
+impl Instance {
+    pub(crate) fn new(index: usize, model: usize, scale: f64, m: DAffine3) -> Result<Self, BuildError> {
+        let transform = Transform::new(m).map_err(|_| BuildError::IllConditioned { instance: index })?;
+        Ok(Self { model: model as u32, transform: transform.with_object_scale(scale) })
+    }
+
+    /// What the tree over instances holds: the model's box in the world, padded for all that is rounded on either side.
+    pub(crate) fn padded_box(&self, model: &Model, tight: &Aabb<f64>) -> Aabb<f64> {
+        let pad = instance_padding(model.bounds());
+        let world = self.transform.linear().abs() * pad * 2.0;
+        let rounding = self.transform.point_error(model.bounds().min.abs().max(model.bounds().max.abs()), DVec3::ZERO);
+        let pad = world + rounding * 4.0;
+        Aabb::new(tight.min - pad, tight.max + pad)
+    }
+}
+
+/// Boxes in the world of what is bounded in each instance: of the vertices themselves where they are not too many in
+/// all, else of the model's box.
+pub(crate) fn tight_boxes(instances: &[Instance], models: &[Model]) -> Vec<Aabb<f64>> {
+    let all: u64 = instances.iter().map(|i| models[i.model as usize].triangle_count() * 3).sum();
+    instances
+        .par_iter()
+        .map(|i| {
+            let model = &models[i.model as usize];
+            if all <= TIGHT {
+                Aabb::from_points(model.extremes().map(|p| i.transform.point(p)))
+            } else {
+                i.transform.aabb(model.bounds())
+            }
+        })
+        .collect()
+}

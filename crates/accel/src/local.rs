@@ -1,0 +1,143 @@
+//! A ray inside an instance: where double precision ends and `f32` begins.
+//!
+//! The world's ray is carried into the object's space in `f64`, its direction scaled by a power of two so that the
+//! largest component is in [1, 2), and its origin moved along it to near the object. Only then is it rounded to `f32`,
+//! once: the distance to the object costs no digit.
+//!
+//! # Why no box is missed
+//! With u = 2^-24, R the largest coordinate difference between the moved origin o and the object, and d the direction:
+//! * rounding o and d moves the ray by at most u|o| + uR in each axis within the object;
+//! * the watertight test decides for a triangle whose vertices are off by at most 6 uR: rounding of `v - o` (u|v - o|
+//!   in two axes), of the shear (u), of its product (u) and of the difference (u(|x| + |z|)).
+//!
+//! So a triangle that the `f32` test accepts lies within `u|o| + 8uR` of the exact ray ([`LocalRay::reach`]), and boxes
+//! that are met as if they were larger by a little more than that contain every hit: the answer is that of testing all
+//! triangles, whatever the tree.
+
+use firsthit_geometry::{Aabb, Ray, Real, slab::Slabs, transform::Transform, triangle::Shear};
+use glam::{DVec3, Vec3};
+
+/// Unit roundoff of `f32`.
+const U: f64 = f32::UNIT_ROUNDOFF as f64;
+
+/// How far outside a ray may be moved nearer, and where to: multiples of the object's half size.
+const FAR: f64 = 8.0;
+
+/// Half the difference between an object's box and the box that is put into the tree over instances, in each axis: more
+/// than any [`LocalRay::reach`].
+pub(crate) fn instance_padding(bounds: &Aabb<f64>) -> DVec3 {
+    // R <= (FAR + 1) half sizes; |o| <= |center| + FAR half sizes; 10 uR + 3u|o| <= 114 u half + 3u|center|.
+    DVec3::splat(half_size(bounds) * 128.0 * U) + bounds.center().abs() * (4.0 * U) + TINY
+}
+
+/// In units of a normalised object, of size near 1: covers directions so small that their rounding to `f32` is not
+/// relative.
+const TINY: f64 = 1.0 / (1u64 << 40) as f64;
+
+fn half_size(bounds: &Aabb<f64>) -> f64 {
+    bounds.extent().max_element() * 0.5
+}
+
+/// A ray in an object's normalised space. Its parameter is `world t * t_scale`.
+#[derive(Clone, Debug)]
+pub(crate) struct LocalRay {
+    /// The ray's own origin.
+    pub(crate) origin: DVec3,
+    /// Direction, largest component in [1, 2).
+    pub(crate) direction: DVec3,
+    /// A power of two.
+    pub(crate) t_scale: f64,
+    /// The moved origin is `origin + shift * direction`, and its parameter counts from there.
+    pub(crate) shift: f64,
+    moved: DVec3,
+    reach: DVec3,
+    /// The moved origin in single precision.
+    pub(crate) origin32: Vec3,
+    /// The direction in single precision.
+    pub(crate) direction32: Vec3,
+    /// Setup of the watertight test in single precision.
+    pub(crate) shear: Shear<f32>,
+    /// Setup of the box test; boxes are met as if larger by more than [`LocalRay::reach`].
+    pub(crate) slabs: Slabs<f32>,
+}
+
+impl LocalRay {
+    /// Enters the object whose primitives lie within `bounds`. `None` where the ray is not finite there.
+    #[inline]
+    pub(crate) fn enter(ray: &Ray<f64>, transform: &Transform, bounds: &Aabb<f64>) -> Option<Self> {
+        let origin = transform.point_to_object(ray.origin);
+        let direction = transform.vector_to_object(ray.direction);
+        let length = direction.abs().max_element().power_of_two_below();
+        let direction = direction * (1.0 / length);
+        if !(origin.is_finite() && direction.is_finite() && direction != DVec3::ZERO) {
+            return None;
+        }
+        let bounds = if bounds.is_empty() { &Aabb::new(DVec3::ZERO, DVec3::ZERO) } else { bounds };
+        let half = half_size(bounds);
+        let center = bounds.center();
+        let relative = origin - center;
+        let mut shift = 0.0;
+        if relative.abs().max_element() > FAR * half {
+            // From the point nearest to the centre back by the size of the box, which is more than half its diagonal.
+            shift = -relative.dot(direction) / direction.dot(direction) - 2.0 * half;
+        }
+        let moved = origin + direction * shift;
+        let farthest = (moved - bounds.min).abs().max((moved - bounds.max).abs()).max_element();
+        let reach = moved.abs() * U + 8.0 * U * farthest;
+
+        let (origin32, direction32) = (moved.as_vec3(), direction.as_vec3());
+        // Two more u|o| for rounding the origin and adding `delta` to it; 2uR to be above `reach` whatever rounds.
+        let delta = (moved.abs() * (3.0 * U) + (10.0 * U * farthest + TINY)).as_vec3();
+        Some(Self {
+            origin,
+            direction,
+            t_scale: length,
+            shift,
+            moved,
+            reach,
+            origin32,
+            direction32,
+            shear: Shear::new(direction32),
+            slabs: Slabs::new(origin32, direction32).widened(delta),
+        })
+    }
+
+    /// How far from the ray, in each axis, a primitive may lie that the tests accept.
+    #[inline]
+    pub(crate) fn reach(&self) -> DVec3 {
+        self.reach
+    }
+
+    /// A parameter of the world's ray as the start of the box tests' interval: not above it.
+    #[inline]
+    pub(crate) fn box_t_min(&self, t: f64) -> f32 {
+        self.box_t(t, -1.0)
+    }
+
+    /// A parameter of the world's ray as the end of the box tests' interval: so far above it that a box which begins
+    /// beyond holds no hit at or before `t`.
+    #[inline]
+    pub(crate) fn box_t_max(&self, t: f64) -> f32 {
+        self.box_t(t, 1.0)
+    }
+
+    #[inline(always)]
+    fn box_t(&self, t: f64, side: f64) -> f32 {
+        let t = t * self.t_scale;
+        let local = t - self.shift;
+        // Entry into a box has four roundings in f32 (and one more is made here), `local` and `t` have a few in f64.
+        let error = local.abs() * (16.0 * U) + (t.abs() + self.shift.abs()) * (16.0 * f64::UNIT_ROUNDOFF);
+        (local + side * error).to_f32()
+    }
+
+    /// Raises `t` (local, counted from the true origin) to where the ray enters the primitive's own box, and lowers it
+    /// to where it leaves: the rule by which a hit never lies before a box that holds it, so that skipping boxes cannot
+    /// change the answer. The box is widened by [`LocalRay::reach`]; `None` when the ray misses even that.
+    #[inline]
+    pub(crate) fn within_box(&self, t: f64, aabb: &Aabb<f64>) -> Option<f64> {
+        let wide = Aabb::new(aabb.min - self.reach(), aabb.max + self.reach());
+        let slabs = Slabs::new(self.moved, self.direction);
+        let (enter, leave) = slabs.padded(&wide, f64::NEG_INFINITY, f64::INFINITY);
+        (enter <= leave).then(|| t.min(leave + self.shift).max(enter + self.shift))
+    }
+}

@@ -1,0 +1,376 @@
+//! One mesh with its tree, in normalised `f32` space.
+
+use core::ops::{ControlFlow, Range};
+
+use firsthit_geometry::{Aabb, Precision, Primitive, Ray, Real, Shape, SurfaceHit, triangle};
+use glam::{DVec3, Vec3};
+
+use crate::build::Topology;
+use crate::kernel::Kernel;
+use crate::layout::Bvh2;
+use crate::local::LocalRay;
+use crate::query::{Candidate, Collector};
+use crate::stats::Probe;
+use crate::traverse::traverse;
+use crate::{BuildError, BuildOptions, Geometry};
+
+/// The parts of one mesh, ready to be traced.
+#[derive(Clone, Debug)]
+pub(crate) struct Model {
+    tree: Bvh2<f32>,
+    depth: u32,
+    /// Triangles in the order of the leaves, divided by `scale`. At the place of a shape there is nothing of use.
+    triangles: Vec<[Vec3; 3]>,
+    /// What lies at each place of the leaves.
+    ids: Vec<PrimitiveId>,
+    /// Place of each primitive of each geometry.
+    places: Vec<Places>,
+    shapes: Vec<ModelShape>,
+    /// Indices into `shapes` of those without a finite box.
+    unbounded: Vec<u32>,
+    /// The power of two by which coordinates were divided.
+    scale: f64,
+    /// Of all that is bounded, normalised.
+    bounds: Aabb<f64>,
+    degenerate: u64,
+}
+
+/// A primitive of a mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct PrimitiveId {
+    pub(crate) geometry: u32,
+    /// The triangle in its geometry.
+    pub(crate) primitive: u32,
+}
+
+/// Where a geometry's primitives are.
+#[derive(Clone, Debug)]
+enum Places {
+    /// Position in the leaves' order of each triangle.
+    Triangles(Vec<u32>),
+    /// Index into the shapes.
+    Shape(u32),
+}
+
+/// A shape in a mesh.
+#[derive(Clone, Debug)]
+pub(crate) struct ModelShape {
+    pub(crate) geometry: u32,
+    pub(crate) shape: Shape<f64>,
+    /// Its box, normalised.
+    bounds: Aabb<f64>,
+}
+
+/// What a hit's id stands for.
+pub(crate) enum Surface<'a> {
+    /// A triangle, normalised.
+    Triangle([DVec3; 3]),
+    Shape(&'a ModelShape),
+}
+
+impl Model {
+    /// Checks and builds mesh number `mesh`.
+    pub(crate) fn new(mesh: usize, geometries: &[Geometry], options: BuildOptions) -> Result<Self, BuildError> {
+        check(mesh, geometries)?;
+        let scale = common_scale(geometries);
+        let normalised = |p: Vec3| (p.as_dvec3() / scale).as_vec3();
+
+        let mut model = Self {
+            tree: Bvh2::new(&Topology::default(), &[]),
+            depth: 0,
+            triangles: Vec::new(),
+            ids: Vec::new(),
+            places: Vec::new(),
+            shapes: Vec::new(),
+            unbounded: Vec::new(),
+            scale,
+            bounds: Aabb::empty(),
+            degenerate: 0,
+        };
+        // Everything in file order first.
+        let mut triangles = Vec::new();
+        let mut boxes = Vec::new();
+        let mut ids = Vec::new();
+        for (g, geometry) in geometries.iter().enumerate() {
+            let g = g as u32;
+            match geometry {
+                Geometry::Triangles { positions, triangles: indices } => {
+                    model.places.push(Places::Triangles(vec![u32::MAX; indices.len()]));
+                    for (k, t) in indices.iter().enumerate() {
+                        let vertices = t.map(|i| normalised(positions[i as usize]));
+                        if triangle::area_vector(vertices.map(|v| v.as_dvec3())) == DVec3::ZERO {
+                            model.degenerate += 1;
+                        }
+                        triangles.push(vertices);
+                        boxes.push(Aabb::from_points(vertices));
+                        ids.push(PrimitiveId { geometry: g, primitive: k as u32 });
+                    }
+                }
+                Geometry::Shape(shape) => {
+                    let index = model.shapes.len() as u32;
+                    model.places.push(Places::Shape(index));
+                    let b = shape.bounds();
+                    let bounds = Aabb::new(b.min / scale, b.max / scale);
+                    if bounds.is_finite() {
+                        triangles.push([Vec3::ZERO; 3]);
+                        boxes.push(bounds.to_f32_outward());
+                        ids.push(PrimitiveId { geometry: g, primitive: 0 });
+                    } else {
+                        model.unbounded.push(index);
+                    }
+                    model.shapes.push(ModelShape { geometry: g, shape: shape.clone(), bounds });
+                }
+            }
+        }
+        model.bounds = boxes.iter().fold(Aabb::empty(), |a, b| a.union(*b)).to_f64();
+        let topology = Topology::new(&boxes, options.quality);
+        model.tree = Bvh2::new(&topology, &boxes);
+        model.depth = topology.depth();
+        model.triangles = topology.order.iter().map(|&i| triangles[i as usize]).collect();
+        model.ids = topology.order.iter().map(|&i| ids[i as usize]).collect();
+        for (place, id) in model.ids.iter().enumerate() {
+            if let Places::Triangles(places) = &mut model.places[id.geometry as usize] {
+                places[id.primitive as usize] = place as u32;
+            }
+        }
+        Ok(model)
+    }
+
+    pub(crate) fn scale(&self) -> f64 {
+        self.scale
+    }
+    /// Box of all that is bounded, normalised; empty when there is nothing.
+    pub(crate) fn bounds(&self) -> &Aabb<f64> {
+        &self.bounds
+    }
+    pub(crate) fn depth(&self) -> u32 {
+        self.depth
+    }
+    pub(crate) fn sah_cost(&self) -> f64 {
+        self.tree.sah_cost()
+    }
+    pub(crate) fn degenerate(&self) -> u64 {
+        self.degenerate
+    }
+    pub(crate) fn has_unbounded(&self) -> bool {
+        !self.unbounded.is_empty()
+    }
+    /// Number of triangles.
+    pub(crate) fn triangle_count(&self) -> u64 {
+        self.places.iter().map(|p| if let Places::Triangles(t) = p { t.len() as u64 } else { 0 }).sum()
+    }
+    /// Memory of tree and primitives.
+    pub(crate) fn bytes(&self) -> usize {
+        self.tree.bytes()
+            + size_of_val(self.triangles.as_slice())
+            + size_of_val(self.ids.as_slice())
+            + self.triangle_count() as usize * size_of::<u32>()
+            + size_of_val(self.shapes.as_slice())
+    }
+
+    /// Everything in the tree: normalised vertices of triangles, or the box of a shape.
+    pub(crate) fn extremes(&self) -> impl Iterator<Item = DVec3> + '_ {
+        let corners = self.shapes.iter().filter(|s| s.bounds.is_finite()).flat_map(|s| s.bounds.corners());
+        self.triangles
+            .iter()
+            .zip(&self.ids)
+            .filter(|(_, id)| matches!(self.places[id.geometry as usize], Places::Triangles(_)))
+            .flat_map(|(t, _)| t.map(|v| v.as_dvec3()))
+            .chain(corners)
+    }
+
+    /// All primitives in the caller's order.
+    pub(crate) fn surfaces(&self) -> impl Iterator<Item = (PrimitiveId, Surface<'_>)> + '_ {
+        self.places.iter().enumerate().flat_map(move |(g, places)| {
+            let count = if let Places::Triangles(t) = places { t.len() } else { 1 };
+            (0..count).filter_map(move |k| {
+                let id = PrimitiveId { geometry: g as u32, primitive: k as u32 };
+                Some((id, self.surface(id)?))
+            })
+        })
+    }
+
+    /// The surface with this id.
+    pub(crate) fn surface(&self, id: PrimitiveId) -> Option<Surface<'_>> {
+        match self.places.get(id.geometry as usize)? {
+            Places::Triangles(places) => {
+                let place = *places.get(id.primitive as usize)?;
+                Some(Surface::Triangle(self.triangles.get(place as usize)?.map(|v| v.as_dvec3())))
+            }
+            Places::Shape(index) => self.shapes.get(*index as usize).map(Surface::Shape),
+        }
+    }
+
+    /// Offers the hits of what is in the tree to the collector.
+    #[inline(always)]
+    pub(crate) fn trace<K: Kernel, C: Collector, P: Probe>(
+        &self,
+        ray: &LocalRay,
+        instance: u32,
+        precision: Precision,
+        collector: &mut C,
+        probe: &mut P,
+    ) -> ControlFlow<()> {
+        // Meshes of triangles alone, nearly all, pay nothing for shapes.
+        if self.shapes.is_empty() {
+            self.trace_tree::<K, C, P, false>(ray, instance, precision, collector, probe)
+        } else {
+            self.trace_tree::<K, C, P, true>(ray, instance, precision, collector, probe)
+        }
+    }
+
+    #[inline(always)]
+    fn trace_tree<K: Kernel, C: Collector, P: Probe, const SHAPES: bool>(
+        &self,
+        ray: &LocalRay,
+        instance: u32,
+        precision: Precision,
+        collector: &mut C,
+        probe: &mut P,
+    ) -> ControlFlow<()> {
+        let setup = K::setup(ray);
+        let t_min = ray.box_t_min(collector.t_min());
+        let t_max = ray.box_t_max(collector.t_max());
+        let leaf = |range: Range<usize>, probe: &mut P| {
+            for place in range {
+                probe.primitive();
+                if SHAPES && let Some(Places::Shape(index)) = self.places.get(self.ids[place].geometry as usize) {
+                    self.offer_shape(*index, ray, instance, precision, collector)?;
+                } else if let Some((t, u, v)) = K::test(&setup, ray, &self.triangles[place]) {
+                    let aabb = Aabb::from_points(self.triangles[place].map(|v| v.as_dvec3()));
+                    if let Some(t) = ray.within_box(t, &aabb) {
+                        let PrimitiveId { geometry, primitive } = self.ids[place];
+                        let t = t / ray.t_scale;
+                        collector.offer(Candidate::new(instance, geometry, primitive, t, u, v))?;
+                    }
+                }
+            }
+            ControlFlow::Continue(ray.box_t_max(collector.t_max()))
+        };
+        traverse(&self.tree, &ray.slabs, t_min, t_max, probe, leaf)
+    }
+
+    /// Offers the hits of shapes without a finite box.
+    pub(crate) fn trace_unbounded<C: Collector>(
+        &self,
+        ray: &LocalRay,
+        instance: u32,
+        precision: Precision,
+        collector: &mut C,
+    ) -> ControlFlow<()> {
+        self.unbounded.iter().try_for_each(|&i| self.offer_shape(i, ray, instance, precision, collector))
+    }
+
+    /// Offers one shape's hits, nearest first, until one is taken or none is left.
+    fn offer_shape<C: Collector>(
+        &self,
+        index: u32,
+        ray: &LocalRay,
+        instance: u32,
+        precision: Precision,
+        collector: &mut C,
+    ) -> ControlFlow<()> {
+        let Some(entry) = self.shapes.get(index as usize) else { return ControlFlow::Continue(()) };
+        let mut local = Ray {
+            origin: ray.origin * self.scale,
+            direction: ray.direction * self.scale,
+            t_min: collector.t_min() * ray.t_scale,
+            t_max: collector.t_max() * ray.t_scale,
+        };
+        // No ray meets one of the shapes more often than this.
+        for _ in 0..16 {
+            let Some(hit) = shape_hit(&entry.shape, &local, precision) else { break };
+            let t = if entry.bounds.is_finite() { ray.within_box(hit.t, &entry.bounds) } else { Some(hit.t) };
+            if let Some(t) = t {
+                let taken = collector.offer(Candidate {
+                    normal: hit.normal.unwrap_or(DVec3::ZERO),
+                    ..Candidate::new(instance, entry.geometry, 0, t / ray.t_scale, hit.u as f32, hit.v as f32)
+                })?;
+                if taken {
+                    break;
+                }
+            }
+            // Refused by a filter, perhaps: then the next root may be taken.
+            local.t_min = hit.t.next_up();
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+impl ModelShape {
+    /// Whether no straight ray that leaves it can come back.
+    pub(crate) fn is_flat(&self) -> bool {
+        matches!(self.shape.kind(), "plane" | "disk" | "annulus" | "polygon" | "rectangle")
+    }
+}
+
+/// Shapes are evaluated in `f64` at every tier: by the shortest formulas or by the stable ones.
+fn shape_hit(shape: &Shape<f64>, ray: &Ray<f64>, precision: Precision) -> Option<SurfaceHit<f64>> {
+    match precision {
+        Precision::Fast => shape.closest_hit_fast(ray),
+        Precision::Robust | Precision::Double => shape.closest_hit(ray),
+    }
+}
+
+/// The power of two below the largest coordinate of a mesh: divided by it, products of three coordinates stay far from
+/// overflow and underflow, and no digit changes.
+fn common_scale(geometries: &[Geometry]) -> f64 {
+    let mut largest = 0.0f64;
+    for geometry in geometries {
+        match geometry {
+            Geometry::Triangles { positions, .. } => {
+                let m = positions.iter().fold(Vec3::ZERO, |m, p| m.max(p.abs()));
+                largest = largest.max(f64::from(m.max_element()));
+            }
+            Geometry::Shape(shape) => {
+                let b = shape.bounds();
+                if b.is_finite() {
+                    largest = largest.max(b.min.abs().max(b.max.abs()).max_element());
+                }
+            }
+        }
+    }
+    largest.power_of_two_below()
+}
+
+/// Everything finite, in range and countable.
+fn check(mesh: usize, geometries: &[Geometry]) -> Result<(), BuildError> {
+    let mut primitives = 0u64;
+    for (geometry, g) in geometries.iter().enumerate() {
+        let Geometry::Triangles { positions, triangles } = g else {
+            primitives += 1;
+            continue;
+        };
+        primitives += triangles.len() as u64;
+        if let Some(vertex) = positions.iter().position(|p| !p.is_finite()) {
+            return Err(BuildError::NotFinite { mesh, geometry, vertex });
+        }
+        let count = positions.len();
+        for (triangle, t) in triangles.iter().enumerate() {
+            if let Some(&index) = t.iter().find(|&&i| i as usize >= count) {
+                return Err(BuildError::IndexOutOfRange { mesh, geometry, triangle, index, count });
+            }
+        }
+    }
+    limit("primitives of a mesh", primitives)?;
+    limit("geometries of a mesh", geometries.len() as u64)
+}
+
+/// Trees of obvhs have `2 n - 1` nodes, counted in 32 bits.
+pub(crate) fn limit(what: &'static str, count: u64) -> Result<(), BuildError> {
+    let limit = u64::from(u32::MAX / 2);
+    if count > limit { Err(BuildError::TooMany { what, count, limit }) } else { Ok(()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_are_limited_before_anything_is_allocated() {
+        assert!(limit("things", 0).is_ok() && limit("things", (1 << 31) - 1).is_ok());
+        for count in [1 << 31, 1 << 32, u64::MAX] {
+            assert!(matches!(limit("things", count), Err(BuildError::TooMany { count: c, .. }) if c == count));
+        }
+    }
+}

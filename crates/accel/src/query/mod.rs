@@ -1,0 +1,34 @@
+//! Queries, one file each, over one way of collecting hits.
+
+mod any_hit;
+mod batch;
+mod closest_hit;
+
+use core::ops::ControlFlow;
+
+use glam::DVec3;
+
+pub(crate) use any_hit::Any;
+pub(crate) use closest_hit::Closest;
+
+use crate::{Hit, HitId};
+
+/// A hit that the collector may want. `normal` is a shape's, in its own space; triangles leave it zero.
+pub(crate) type Candidate = Hit;
+
+impl Candidate {
+    #[inline(always)]
+    pub(crate) fn new(instance: u32, geometry: u32, primitive: u32, t: f64, u: f32, v: f32) -> Self {
+        Self { id: HitId { instance, geometry, primitive }, t, u, v, normal: DVec3::ZERO }
+    }
+}
+
+/// Takes the hits that a traversal finds, in any order.
+pub(crate) trait Collector {
+    /// Start of the interval.
+    fn t_min(&self) -> f64;
+    /// End of the interval from here on: hits beyond are not wanted any more.
+    fn t_max(&self) -> f64;
+    /// Takes a hit or not; breaks when nothing more is wanted.
+    fn offer(&mut self, hit: Candidate) -> ControlFlow<(), bool>;
+}

@@ -1,0 +1,58 @@
+//! The slow twin: every primitive tested in `f64`, no tree.
+//!
+//! Obvious, and right wherever double precision can decide. Queries of any tier and layout are tested against it; it is
+//! public so that you can do so too.
+
+use firsthit_geometry::{Primitive, Ray, triangle};
+use glam::DVec3;
+
+use crate::model::Surface;
+use crate::{Hit, HitId, Scene};
+
+/// All hits in the ray's closed interval, by `t`, then by id. Of a shape that a ray meets more than once, all.
+#[must_use]
+pub fn all_hits(scene: &Scene, ray: &Ray<f64>) -> Vec<Hit> {
+    let mut hits = Vec::new();
+    if !ray.is_valid() {
+        return hits;
+    }
+    for (i, instance) in scene.instances().iter().enumerate() {
+        let Some(model) = scene.models().get(instance.model as usize) else { continue };
+        let transform = &instance.transform;
+        let local = transform.ray_to_object(ray);
+        for (id, surface) in model.surfaces() {
+            let id = HitId { instance: i as u32, geometry: id.geometry, primitive: id.primitive };
+            match surface {
+                Surface::Triangle(v) => {
+                    if let Some(h) = triangle::watertight(v, &local) {
+                        let normal = triangle::normal(v).map_or(DVec3::ZERO, |n| transform.normal(n));
+                        hits.push(Hit { id, t: h.t, u: h.u as f32, v: h.v as f32, normal });
+                    }
+                }
+                Surface::Shape(s) => {
+                    let scale = model.scale();
+                    let mut rest = Ray { origin: local.origin * scale, direction: local.direction * scale, ..local };
+                    while let Some(h) = s.shape.closest_hit(&rest) {
+                        let normal = h.normal.map_or(DVec3::ZERO, |n| transform.normal(n));
+                        hits.push(Hit { id, t: h.t, u: h.u as f32, v: h.v as f32, normal });
+                        rest.t_min = h.t.next_up();
+                    }
+                }
+            }
+        }
+    }
+    hits.sort_by(|a, b| a.t.total_cmp(&b.t).then(a.id.cmp(&b.id)));
+    hits
+}
+
+/// The nearest hit, of equally near ones the smallest id.
+#[must_use]
+pub fn closest_hit(scene: &Scene, ray: &Ray<f64>) -> Option<Hit> {
+    all_hits(scene, ray).into_iter().next()
+}
+
+/// Whether there is a hit.
+#[must_use]
+pub fn any_hit(scene: &Scene, ray: &Ray<f64>) -> bool {
+    !all_hits(scene, ray).is_empty()
+}

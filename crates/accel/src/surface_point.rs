@@ -1,0 +1,83 @@
+//! Where exactly a hit is.
+
+use firsthit_geometry::{Precision, Ray, Real, transform::Transform, triangle};
+use glam::DVec3;
+
+use crate::model::Surface;
+use crate::{Hit, Scene, SurfacePoint};
+
+/// Roundings in the evaluation of a shape, its coordinates' magnitude being the unit: the longest formula (a general
+/// quadric) has about sixty operations.
+const SHAPE_ROUNDINGS: u32 = 64;
+
+impl Scene {
+    /// Where exactly a hit is, for starting other rays there. `ray` is the ray that found it.
+    ///
+    /// On a triangle the point is made from the barycentric weights in double precision, which is closer to the
+    /// surface than `origin + t * direction`: its distance from the plane does not grow with that of the ray's origin.
+    #[must_use]
+    pub fn surface_point(&self, ray: &Ray<f64>, hit: &Hit) -> SurfacePoint {
+        let fallback = SurfacePoint { position: ray.at(hit.t), normal: hit.normal, error: 0.0 };
+        let Some((instance, surface)) = self.surface(&hit.id) else { return fallback };
+        let transform = &instance.transform;
+        let (point, error, normal) = match surface {
+            Surface::Triangle(v) => {
+                let (point, error) = on_triangle(v, hit, self.options().precision);
+                (point, error, triangle::normal(v).unwrap_or(DVec3::ZERO))
+            }
+            Surface::Shape(_) => {
+                // In the object's space: far from the world's origin `ray.at(t)` has lost digits that are known here.
+                let local = transform.ray_to_object(ray);
+                let along = local.direction * hit.t;
+                let point = local.origin + along;
+                // Rounding in each step from the ray to the point is relative to these.
+                let magnitude = (local.origin.abs() + along.abs()).max_element();
+                // A unit normal of the world, back: the inverse transpose of the inverse transpose.
+                let normal = (transform.linear().transpose() * hit.normal).normalize_or_zero();
+                (point, DVec3::splat(magnitude * gamma(SHAPE_ROUNDINGS)), normal)
+            }
+        };
+        let position = transform.point(point);
+        SurfacePoint { position, normal: hit.normal, error: distance(transform, point, error, normal, position) }
+    }
+}
+
+/// The point of a triangle with a hit's weights, and its error in each axis together with that of the tests that rays
+/// from there undergo.
+fn on_triangle(v: [DVec3; 3], hit: &Hit, precision: Precision) -> (DVec3, DVec3) {
+    let (e1, e2) = (v[1] - v[0], v[2] - v[0]);
+    let point = v[0] + e1 * f64::from(hit.u) + e2 * f64::from(hit.v);
+    let magnitude = v[0].abs() + e1.abs() + e2.abs();
+    let error = match precision {
+        // The test works on vertices relative to a rounded origin, in f32.
+        Precision::Fast => magnitude * (8.0 * f64::from(f32::UNIT_ROUNDOFF)),
+        // The test's distance comes from the plane in f64, whose normal tilts by some roundings times the aspect.
+        Precision::Robust | Precision::Double => {
+            let e3 = e2 - e1;
+            let (a, b, c) = (e1.length(), e2.length(), e3.length());
+            let longest = a.max(b).max(c);
+            let area = triangle::area_vector(v).length();
+            let tilt = if area > 0.0 { longest * longest / area } else { 1.0 };
+            magnitude * gamma(8) + DVec3::splat(longest * tilt * gamma(8))
+        }
+    };
+    (point, error)
+}
+
+/// How far to go along the world's normal so as to be off the surface for certain: from `error` in the object's space,
+/// the roundings of the way to the world and back, and those of the point in the world.
+fn distance(transform: &Transform, point: DVec3, error: DVec3, normal: DVec3, position: DVec3) -> f64 {
+    let to_world = transform.point_error(point, DVec3::ZERO);
+    let back = transform.point_to_object_error(position + to_world);
+    // The inverse is rounded too: going there and back moves a point by |M^-1| |M| |p| times a few roundings.
+    let bijection = transform.inverse_linear().abs() * (transform.linear().abs() * point.abs()) * gamma(16);
+    let object = normal.abs().dot(error + back + bijection);
+    // One unit along the world's normal is so much along the object's.
+    let unit = (transform.inverse_linear().transpose() * normal).length();
+    let world = transform.normal(normal).abs().dot(to_world + position.abs() * gamma(2));
+    if unit > 0.0 { object / unit + world } else { world }
+}
+
+fn gamma(n: u32) -> f64 {
+    <f64 as Real>::gamma(n)
+}

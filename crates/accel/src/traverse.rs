@@ -1,0 +1,81 @@
+//! One traversal for all trees, tests and queries.
+
+use core::ops::{ControlFlow, Range};
+
+use firsthit_geometry::{Real, slab::Slabs};
+
+use crate::build::{Child, MAX_DEPTH};
+use crate::layout::Tree;
+use crate::stats::Probe;
+
+/// Visits the leaves that the ray meets in `[t_min, t_max]`, nearer boxes first.
+///
+/// `leaf` gets the run of primitives and answers with the end of the interval from there on (it may shrink as hits are
+/// found), or breaks. Boxes that begin *beyond* that end are skipped; those that begin at it are visited, so that
+/// primitives at equal distance are all seen.
+#[inline(always)]
+pub(crate) fn traverse<R: Real, T: Tree<R>, P: Probe>(
+    tree: &T,
+    ray: &Slabs<R>,
+    t_min: R,
+    mut t_max: R,
+    probe: &mut P,
+    mut leaf: impl FnMut(Range<usize>, &mut P) -> ControlFlow<(), R>,
+) -> ControlFlow<()> {
+    let Some(mut current) = tree.root() else { return ControlFlow::Continue(()) };
+    let mut stack = Stack::new();
+    loop {
+        if current.is_leaf() {
+            t_max = leaf(current.range(), probe)?;
+        } else {
+            let [first, second] = if P::PRUNE {
+                probe.boxes(2);
+                let [a, b] = tree.children(current.first, ray, t_min, t_max);
+                if P::REVERSED && b.is_some() { [b, a] } else { [a, b] }
+            } else {
+                tree.all_children(current.first).map(|c| Some((c, t_min)))
+            };
+            if let Some(later) = second {
+                stack.push(later);
+            }
+            if let Some((child, _)) = first {
+                current = child;
+                continue;
+            }
+        }
+        loop {
+            let Some((child, enter)) = stack.pop() else { return ControlFlow::Continue(()) };
+            if enter <= t_max || !P::PRUNE {
+                current = child;
+                break;
+            }
+        }
+    }
+}
+
+/// What is left to visit. It never overflows: no tree is deeper than [`MAX_DEPTH`], and each level leaves at most one
+/// child behind.
+struct Stack<R> {
+    entries: [(Child, R); MAX_DEPTH as usize],
+    len: usize,
+}
+
+impl<R: Real> Stack<R> {
+    #[inline(always)]
+    fn new() -> Self {
+        Self { entries: [(Child { first: 0, count: 0 }, R::ZERO); MAX_DEPTH as usize], len: 0 }
+    }
+    #[inline(always)]
+    fn push(&mut self, entry: (Child, R)) {
+        debug_assert!(self.len < self.entries.len());
+        if let Some(slot) = self.entries.get_mut(self.len) {
+            *slot = entry;
+            self.len += 1;
+        }
+    }
+    #[inline(always)]
+    fn pop(&mut self) -> Option<(Child, R)> {
+        self.len = self.len.checked_sub(1)?;
+        self.entries.get(self.len).copied()
+    }
+}
