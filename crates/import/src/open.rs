@@ -127,8 +127,8 @@ pub(crate) fn read_as(
     including: &[PathBuf],
 ) -> Result<Imported, ImportError> {
     match format {
-        Format::Obj => crate::obj::read(file, options),
-        Format::Gltf => Err(ImportError::unsupported(file, "", "this format is not read yet")),
+        Format::Obj => obj::read(file, options),
+        Format::Gltf => gltf::read(file, options),
         Format::Scene => toml::read_included(file, options, including),
     }
 }
