@@ -1,4 +1,6 @@
-//! What the tests share: where public data is found.
+//! What the tests share: the hard cases, and where public data is found.
+
+pub mod corpus;
 
 use std::path::{Path, PathBuf};
 

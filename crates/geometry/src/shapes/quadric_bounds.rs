@@ -32,6 +32,9 @@ pub(super) fn region_bounds(q: [f64; 10], clip: Aabb<f64>) -> Aabb<f64> {
 fn axis_aligned(a: [f64; 3], b: [f64; 3], j: f64, clip: Aabb<f64>) -> Aabb<f64> {
     let mut bounds = clip;
     for axis in [0, 1, 2, 0, 1, 2] {
+        if bounds.is_empty() {
+            return Aabb::empty();
+        }
         let others = (0..3).filter(|&i| i != axis);
         let least: f64 = others.map(|i| least_value(a[i], b[i], bounds.min[i], bounds.max[i])).sum();
         let (low, high) = solutions(a[axis], b[axis], -(least + j));
