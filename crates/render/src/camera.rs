@@ -311,3 +311,183 @@ impl FilmCamera {
         if self.perspective { Cone { width: 0.0, spread: self.pixel } } else { Cone { width: self.pixel, spread: 0.0 } }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{DAffine3, DMat3};
+    use proptest::prelude::*;
+
+    fn close(a: DVec3, b: DVec3) {
+        assert!((a - b).length() < 1e-12 * (1.0 + a.length()), "{a} is not {b}");
+    }
+
+    fn standard() -> Camera {
+        Camera::look_at(DVec3::new(0.0, 1.8, 5.5), DVec3::new(0.0, 0.6, 0.0), DVec3::Y, 40_f64.to_radians()).unwrap()
+    }
+
+    /// The formula of the reference scenes, written out: d = f + (2 px/W - 1) tan(fov/2) r + (1 - 2 py/H) tan(fov/2) u.
+    #[test]
+    fn rays_follow_the_references_formula() {
+        let (origin, target) = (DVec3::new(0.0, 1.8, 5.5), DVec3::new(0.0, 0.6, 0.0));
+        let f = (target - origin).normalize();
+        let r = f.cross(DVec3::Y).normalize();
+        let u = r.cross(f);
+        let tan = 20_f64.to_radians().tan();
+        let film = standard().on_film(256, 256);
+        for (px, py) in [(0.0, 0.0), (128.0, 128.0), (256.0, 0.0), (3.25, 200.75), (255.5, 255.5)] {
+            let ray = film.ray([px, py]);
+            let d = f + r * ((2.0 * px / 256.0 - 1.0) * tan) + u * ((1.0 - 2.0 * py / 256.0) * tan);
+            close(ray.origin, origin);
+            close(ray.direction, d.normalize());
+        }
+    }
+
+    #[test]
+    fn the_angle_of_view_is_vertical() {
+        let film = standard().on_film(320, 200);
+        let angle = |a: [f64; 2], b: [f64; 2]| film.ray(a).direction.angle_between(film.ray(b).direction);
+        assert!((angle([160.0, 0.0], [160.0, 200.0]) - 40_f64.to_radians()).abs() < 1e-12);
+        let across = 2.0 * (20_f64.to_radians().tan() * 1.6).atan();
+        assert!((angle([0.0, 100.0], [320.0, 100.0]) - across).abs() < 1e-12);
+        // A pixel's cone is as wide as the pixel, in the middle.
+        let pixel = (angle([160.0, 99.5], [160.0, 100.5]) / 2.0).tan() * 2.0;
+        assert!((film.cone().spread - pixel).abs() < 1e-6 && film.cone().width == 0.0);
+    }
+
+    #[test]
+    fn a_files_camera_looks_along_its_minus_z() {
+        let turn = DMat3::from_rotation_y(0.5) * DMat3::from_rotation_x(-0.3);
+        let desc = CameraDesc {
+            name: String::new(),
+            // Scale does not matter.
+            transform: DAffine3::from_mat3_translation(turn * 3.0, DVec3::new(1.0, 2.0, 3.0)),
+            projection: Projection::Perspective { vertical_fov: 0.7, aspect: None },
+        };
+        let camera = Camera::from_desc(&desc, &Aabb::empty()).unwrap();
+        close(camera.forward(), turn * DVec3::NEG_Z);
+        close(camera.up(), turn * DVec3::Y);
+        close(camera.right(), turn * DVec3::X);
+        close(camera.position(), DVec3::new(1.0, 2.0, 3.0));
+        let bounds = Aabb::new(DVec3::splat(-11.0), DVec3::splat(-9.0));
+        let depth = (DVec3::splat(-10.0) - camera.position()).dot(camera.forward());
+        let camera = Camera::from_desc(&desc, &bounds).unwrap();
+        close(camera.focal_point(), camera.position() + camera.forward() * depth.max(1.0));
+    }
+
+    #[test]
+    fn a_narrow_picture_shows_all_that_a_files_camera_shows() {
+        let projection = Projection::Perspective { vertical_fov: 0.8, aspect: Some(2.0) };
+        let desc = CameraDesc { name: String::new(), transform: DAffine3::IDENTITY, projection };
+        let camera = Camera::from_desc(&desc, &Aabb::empty()).unwrap();
+        let half_width = |w, h| {
+            let d = camera.on_film(w, h).ray([f64::from(w), 0.5 * f64::from(h)]).direction;
+            d.x / -d.z
+        };
+        let made_for = 2.0 * 0.4_f64.tan();
+        for (w, h) in [(200, 100), (100, 100), (50, 100)] {
+            assert!((half_width(w, h) - made_for).abs() < 1e-12, "{w}x{h}");
+        }
+        assert!((half_width(400, 100) - 2.0 * made_for).abs() < 1e-12);
+    }
+
+    #[test]
+    fn orthographic_rays_are_parallel_and_keep_the_size_at_the_focal_point() {
+        let changes = CameraChanges { orthographic: true, ..Default::default() };
+        let (wide, flat) = (standard().on_film(100, 100), standard().changed(&changes).unwrap().on_film(100, 100));
+        let distance = (DVec3::new(0.0, 1.8, 5.5) - DVec3::new(0.0, 0.6, 0.0)).length();
+        for p in [[0.0, 0.0], [100.0, 30.0], [50.0, 50.0]] {
+            let (a, b) = (wide.ray(p), flat.ray(p));
+            close(b.direction, standard().forward());
+            // They meet in the plane through the focal point.
+            let t = distance / a.direction.dot(standard().forward());
+            close(a.at(t), b.at(distance));
+        }
+        assert_eq!(flat.cone().spread, 0.0);
+    }
+
+    #[test]
+    fn changes_do_what_their_names_say() {
+        let camera = standard();
+        let changed = |c: CameraChanges| camera.changed(&c).unwrap();
+        assert_eq!(changed(CameraChanges::default()), camera);
+
+        let moved = changed(CameraChanges { position: Some(DVec3::new(5.0, 0.6, 0.0)), ..Default::default() });
+        close(moved.forward(), DVec3::NEG_X);
+        close(moved.focal_point(), camera.focal_point());
+
+        // From above, a camera at +Z that turns counter-clockwise comes to +X.
+        let level = Camera::look_at(DVec3::Z * 4.0, DVec3::ZERO, DVec3::Y, 0.5).unwrap();
+        let quarter = std::f64::consts::FRAC_PI_2;
+        let turned = level.changed(&CameraChanges { azimuth: quarter, ..Default::default() }).unwrap();
+        close(turned.position(), DVec3::X * 4.0);
+        close(turned.forward(), DVec3::NEG_X);
+        let raised = level.changed(&CameraChanges { elevation: quarter / 3.0, ..Default::default() }).unwrap();
+        close(raised.position(), DVec3::new(0.0, 2.0, 4.0 * (quarter / 3.0).cos()));
+        close(raised.focal_point(), DVec3::ZERO);
+        assert!(raised.up().y > 0.0);
+
+        let tan = |c: &Camera| match c.projection() {
+            Projection::Perspective { vertical_fov, .. } => (0.5 * vertical_fov).tan(),
+            Projection::Orthographic { half_height, .. } => half_height,
+        };
+        let zoomed = changed(CameraChanges { zoom: Some(2.0), ..Default::default() });
+        assert!((tan(&zoomed) - 0.5 * tan(&camera)).abs() < 1e-12, "twice as large in the picture");
+        let wide = changed(CameraChanges { view_angle: Some(1.0), ..Default::default() });
+        assert!((tan(&wide) - 0.5_f64.tan()).abs() < 1e-12);
+        let sideways = changed(CameraChanges { view_up: Some(DVec3::X), ..Default::default() });
+        assert!(sideways.up().x > 0.99);
+    }
+
+    #[test]
+    fn what_makes_no_camera_is_refused() {
+        let camera = standard();
+        let refused = |c: CameraChanges| camera.changed(&c).unwrap_err();
+        assert_eq!(
+            refused(CameraChanges { position: Some(camera.focal_point()), ..Default::default() }),
+            CameraError::NoDirection
+        );
+        assert_eq!(
+            refused(CameraChanges { position: Some(DVec3::NAN), ..Default::default() }),
+            CameraError::NotFinite("position")
+        );
+        for angle in [0.0, -1.0, 3.2, f64::NAN] {
+            assert_eq!(
+                refused(CameraChanges { view_angle: Some(angle), ..Default::default() }),
+                CameraError::ViewAngle
+            );
+        }
+        for zoom in [0.0, -1.0, f64::INFINITY, f64::NAN] {
+            let c = CameraChanges { zoom: Some(zoom), ..Default::default() };
+            assert_eq!(refused(c), CameraError::NotPositive("zoom factor"));
+        }
+        let c = CameraChanges { azimuth: f64::INFINITY, ..Default::default() };
+        assert_eq!(refused(c), CameraError::NotFinite("azimuth"));
+        let desc = CameraDesc {
+            name: String::new(),
+            transform: DAffine3::ZERO,
+            projection: Projection::Orthographic { half_height: 1.0, aspect: None },
+        };
+        assert_eq!(Camera::from_desc(&desc, &Aabb::empty()), Err(CameraError::Degenerate));
+    }
+
+    proptest! {
+        /// Any position, target and up, at scales from 1e-9 to 1e9: an orthonormal frame whose middle ray meets the target.
+        #[test]
+        fn frames_are_orthonormal(
+            p in prop::array::uniform3(-1.0_f64..1.0), t in prop::array::uniform3(-1.0_f64..1.0),
+            up in prop::sample::select(vec![DVec3::Y, DVec3::Z, DVec3::NEG_X, DVec3::ZERO]),
+            exponent in -9..9,
+        ) {
+            let scale = 10_f64.powi(exponent);
+            let (p, t) = (DVec3::from(p) * scale, DVec3::from(t) * scale);
+            prop_assume!((p - t).length() > 1e-6 * scale);
+            let c = Camera::look_at(p, t, up, 0.5).unwrap();
+            prop_assert!((c.right().cross(c.up()) + c.forward()).length() < 1e-12);
+            prop_assert!(c.right().dot(c.up()).abs() < 1e-12);
+            let ray = c.on_film(64, 48).ray([32.0, 24.0]);
+            let along = (t - p).length();
+            prop_assert!((ray.at(along) - t).length() < 1e-12 * scale);
+        }
+    }
+}

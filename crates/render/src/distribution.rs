@@ -17,6 +17,12 @@ impl Distribution1D {
         (accumulate(weights, &mut sums) > 0.0).then_some(Self { sums })
     }
 
+    /// How many cells there are.
+    #[must_use]
+    pub fn cells(&self) -> usize {
+        self.sums.len() - 1
+    }
+
     /// The cell that `u` in [0, 1) falls into (never one of probability 0), and where in the cell, in [0, 1).
     #[inline]
     #[must_use]

@@ -207,3 +207,88 @@ impl Band<'_> {
         &mut self.pixels[i * self.layers..][..self.layers]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample(i: u32) -> [f32; 4] {
+        let x = ((i * 2_654_435_761) >> 8) as f32 / (1 << 24) as f32;
+        [x, 1e-3 * x, 1e3 * x, 1.0]
+    }
+
+    /// One run of 100 samples, and the same in passes cut anywhere: the same bits.
+    #[test]
+    fn passes_give_the_bits_of_one_run() {
+        let mut whole = Accumulator::default();
+        (0..100).for_each(|i| whole.add(sample(i)));
+        for cuts in [vec![16, 32], vec![1, 2, 3], vec![50], vec![15, 17, 99]] {
+            let mut state = Accumulator::default();
+            let mut done = 0;
+            for end in cuts.into_iter().chain([100]) {
+                let mut resumed = state;
+                (done..end).for_each(|i| resumed.add(sample(i)));
+                (state, done) = (resumed, end);
+            }
+            assert_eq!(state, whole);
+        }
+        let exact: f64 = (0..100).map(|i| f64::from(sample(i)[0])).sum::<f64>() / 100.0;
+        assert!((f64::from(whole.mean()[0]) - exact).abs() < 1e-6);
+        assert_eq!((whole.count(), Accumulator::default().mean()), (100, [0.0; 4]));
+    }
+
+    /// A million samples of the same value: the mean is that value, where an f32 sum would have stalled.
+    #[test]
+    fn many_samples_do_not_drift() {
+        let mut a = Accumulator::default();
+        (0..1 << 20).for_each(|_| a.add([0.1, 1e-8, 1e8, 1.0]));
+        for (m, v) in a.mean().into_iter().zip([0.1, 1e-8, 1e8, 1.0]) {
+            assert!((m / v - 1.0_f32).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn bands_cover_every_pixel_of_the_window_once() {
+        for (crop, rows) in [(None, 4), (Some(Crop { x: 3, y: 5, width: 6, height: 100 }), 3), (None, 100)] {
+            let mut film = Film::new(10, 12, crop, &[Aov::Normal]);
+            film.par_bands_mut(rows).for_each(|mut band| {
+                for y in band.rows() {
+                    for x in band.columns() {
+                        let pixel = band.pixel(x, y);
+                        assert_eq!(pixel.len(), 2);
+                        pixel[0].add([x as f32, y as f32, 0.0, 1.0]);
+                    }
+                }
+            });
+            let window = film.window();
+            assert!(film.pixels.iter().step_by(2).all(|a| a.count() == 1));
+            let picture = film.color();
+            assert_eq!((picture.width, picture.height), (window.width, window.height));
+            assert_eq!(picture.pixels[0], [window.x as f32, window.y as f32, 0.0, 1.0]);
+            let last = [(window.x + window.width - 1) as f32, (window.y + window.height - 1) as f32, 0.0, 1.0];
+            assert_eq!(picture.pixels.last(), Some(&last));
+        }
+    }
+
+    #[test]
+    fn other_pictures_are_means_over_what_was_hit() {
+        let mut film = Film::new(2, 1, None, &[Aov::Depth, Aov::Normal, Aov::Depth]);
+        assert_eq!(film.aovs(), [Aov::Depth, Aov::Normal]);
+        let mut band = film.bands_mut(1).next().unwrap();
+        band.pixel(0, 0)[1].add([3.0, 3.0, 3.0, 1.0]);
+        band.pixel(0, 0)[1].add([0.0, 0.0, 0.0, 0.0]);
+        drop(band);
+        let depth = film.aov(Aov::Depth).unwrap();
+        assert_eq!(depth.pixels[0], [3.0, 3.0, 3.0, 0.5]);
+        assert_eq!(depth.pixels[1], [f32::INFINITY, f32::INFINITY, f32::INFINITY, 0.0]);
+        assert_eq!(film.aov(Aov::Normal).unwrap().pixels[0], [0.0; 4]);
+        assert!(film.aov(Aov::Uv).is_none());
+    }
+
+    #[test]
+    fn a_window_outside_the_picture_is_empty() {
+        let film = Film::new(4, 4, Some(Crop { x: 9, y: 0, width: 5, height: 5 }), &[]);
+        assert_eq!((film.window().width, film.color().pixels.len()), (0, 0));
+        assert_eq!(Film::new(0, 0, None, &[]).clone().bands_mut(8).count(), 0);
+    }
+}

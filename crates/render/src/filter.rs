@@ -2,20 +2,32 @@
 
 use std::f64::consts::TAU;
 
+use crate::distribution::Distribution1D;
+
 /// The weight of light around a pixel's middle.
 #[derive(Clone, Debug)]
 pub enum Filter {
     /// Even over the pixel's own square.
     Box,
-    /// Blackman-Harris window of radius 1.5 pixels in both axes: smooth, nearly free of ringing and aliasing.
-    BlackmanHarris(Box<BlackmanHarris>),
+    /// A window in both axes.
+    Window {
+        /// Where its weight ends, in pixels from the middle.
+        radius: f64,
+        /// Its weight by equal steps from one end to the other.
+        weights: Distribution1D,
+    },
 }
 
 impl Filter {
-    /// The Blackman-Harris filter, with its table.
+    /// The four-term Blackman-Harris window of radius 1.5 pixels: smooth, nearly free of ringing and aliasing.
+    ///
+    /// Harris, *On the Use of Windows for Harmonic Analysis with the Discrete Fourier Transform*, 1978.
     #[must_use]
     pub fn blackman_harris() -> Self {
-        Self::BlackmanHarris(Box::new(BlackmanHarris::new()))
+        const STEPS: usize = 512;
+        let weights: Vec<f32> = (0..STEPS).map(|i| blackman_harris((i as f64 + 0.5) / STEPS as f64) as f32).collect();
+        // The window is positive, so the table is never refused.
+        Distribution1D::new(&weights).map_or(Self::Box, |weights| Self::Window { radius: 1.5, weights })
     }
 
     /// Where a sample lies relative to the pixel's middle, in pixels, for a point of the unit square.
@@ -24,48 +36,46 @@ impl Filter {
     pub fn offset(&self, u: [f32; 2]) -> [f64; 2] {
         match self {
             Self::Box => u.map(|x| f64::from(x) - 0.5),
-            Self::BlackmanHarris(table) => u.map(|x| table.offset(x)),
+            Self::Window { radius, weights } => u.map(|x| {
+                let (step, inside) = weights.sample(x);
+                radius * (2.0 * (step as f64 + f64::from(inside)) / weights.cells() as f64 - 1.0)
+            }),
         }
     }
 }
 
-/// The inverse of the window's sum, tabulated.
-#[derive(Clone, Debug)]
-pub struct BlackmanHarris {
-    inverse: [f64; CELLS + 1],
+/// The window at `t` in [0, 1].
+fn blackman_harris(t: f64) -> f64 {
+    const TERMS: [f64; 4] = [0.358_75, -0.488_29, 0.141_28, -0.011_68];
+    TERMS.into_iter().enumerate().map(|(k, a)| a * (TAU * k as f64 * t).cos()).sum()
 }
 
-const CELLS: usize = 512;
-const RADIUS: f64 = 1.5;
-/// The four-term window: Harris, *On the Use of Windows for Harmonic Analysis with the DFT*, 1978.
-const TERMS: [f64; 4] = [0.358_75, -0.488_29, 0.141_28, -0.011_68];
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-impl BlackmanHarris {
-    fn new() -> Self {
-        let mut inverse = [0.0; CELLS + 1];
-        for (i, value) in inverse.iter_mut().enumerate() {
-            // Bisection down to the last bit: the sum is monotonic.
-            let target = i as f64 / CELLS as f64;
-            let (mut low, mut high) = (0.0, 1.0);
-            for _ in 0..60 {
-                let middle = 0.5 * (low + high);
-                if window_sum(middle) < target { low = middle } else { high = middle }
-            }
-            *value = (0.5 * (low + high) - 0.5) * 2.0 * RADIUS;
+    const RADIUS: f64 = 1.5;
+
+    #[test]
+    fn the_box_covers_its_pixel_evenly() {
+        assert_eq!(Filter::Box.offset([0.0, 0.75]), [-0.5, 0.25]);
+    }
+
+    /// Moments of the sampled offsets against those of the window, by the midpoint rule.
+    #[test]
+    fn offsets_follow_the_window() {
+        let filter = Filter::blackman_harris();
+        let n = 1 << 14;
+        let offsets: Vec<f64> = (0..n).map(|i| filter.offset([(i as f32 + 0.5) / n as f32, 0.5])[0]).collect();
+        assert!(offsets.iter().all(|x| x.abs() <= RADIUS));
+        assert!(offsets.windows(2).all(|w| w[0] <= w[1]));
+        let window = |x: f64| blackman_harris(x / (2.0 * RADIUS) + 0.5);
+        let grid = || (0..n).map(|i| RADIUS * (2.0 * (f64::from(i) + 0.5) / f64::from(n) - 1.0));
+        let total: f64 = grid().map(window).sum();
+        for power in [1, 2, 4] {
+            let expected = grid().map(|x| window(x) * x.powi(power)).sum::<f64>() / total;
+            let sampled = offsets.iter().map(|x| x.powi(power)).sum::<f64>() / f64::from(n);
+            assert!((expected - sampled).abs() < 1e-4, "moment {power}: {sampled} is not {expected}");
         }
-        Self { inverse }
     }
-
-    fn offset(&self, u: f32) -> f64 {
-        let x = f64::from(u) * CELLS as f64;
-        let cell = (x as usize).min(CELLS - 1);
-        let (a, b) = (self.inverse[cell], self.inverse[cell + 1]);
-        a + (b - a) * (x - cell as f64)
-    }
-}
-
-/// The share of the window before `t` in [0, 1].
-fn window_sum(t: f64) -> f64 {
-    let waves = (1..4).map(|k| TERMS[k] * (TAU * k as f64 * t).sin() / (TAU * k as f64)).sum::<f64>();
-    t + waves / TERMS[0]
 }

@@ -148,3 +148,102 @@ fn sigmoid_arm(x: f32, end: f32, power: f32) -> f32 {
     let bend = ((SLOPE * end / 0.5).powf(power) - 1.0) / end.powf(power);
     SLOPE * x * (1.0 + bend * x.powf(power)).powf(-1.0 / power)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn view(transform: ViewTransform, exposure: f32) -> View {
+        View { transform, exposure }
+    }
+
+    #[test]
+    fn the_srgb_curve_has_its_published_values_and_inverts() {
+        // IEC 61966-2-1: 8-bit codes and their linear values.
+        for (code, linear) in
+            [(0, 0.0), (10, 0.003_035_3), (55, 0.038_204_4), (118, 0.181_164), (188, 0.502_886), (255, 1.0)]
+        {
+            let encoded = code as f32 / 255.0;
+            assert!((srgb_to_linear(encoded) - linear).abs() < 2e-6, "{code}");
+            assert!((linear_to_srgb(linear) - encoded).abs() < 2e-5, "{code}");
+        }
+        for i in 0..=1000 {
+            let x = i as f32 / 1000.0;
+            assert!((srgb_to_linear(linear_to_srgb(x)) - x).abs() < 1e-6);
+        }
+    }
+
+    /// The equations of the Khronos specification, evaluated in f64 by their cases.
+    #[test]
+    fn pbr_neutral_follows_its_specification() {
+        let expected = |c: [f64; 3]| -> [f64; 3] {
+            let x = c.iter().copied().fold(f64::INFINITY, f64::min);
+            let f = if x <= 0.08 { x - x * x / 0.16 } else { 0.04 };
+            let p = c.iter().copied().fold(0.0, f64::max) - f;
+            let ks: f64 = 0.8 - 0.04;
+            let pn = 1.0 - (1.0 - ks).powi(2) / (p + 1.0 - 2.0 * ks);
+            let g = 1.0 / (0.15 * (p - pn) + 1.0);
+            c.map(|c| if p <= ks { c - f } else { (c - f) * pn / p * g + pn * (1.0 - g) })
+        };
+        for c in
+            [[0.0, 0.0, 0.0], [0.5, 0.3, 0.2], [0.05, 0.8, 0.3], [1.0, 1.0, 1.0], [8.0, 0.5, 0.01], [900.0, 2.0, 0.0]]
+        {
+            let got = pbr_neutral(Vec3::from(c.map(|x| x as f32)));
+            for (g, e) in got.to_array().into_iter().zip(expected(c)) {
+                assert!((f64::from(g) - e).abs() < 2e-6, "{c:?}: {got}");
+            }
+        }
+        // Its promise: a base colour seen with 4 % of white reflection comes out as it is.
+        let base = Vec3::new(0.1, 0.5, 0.7);
+        assert!((pbr_neutral(base + 0.04) - base).length() < 1e-6);
+    }
+
+    #[test]
+    fn agx_puts_middle_grey_in_the_middle_and_the_ends_at_the_ends() {
+        // The matrices keep greys, and the curve's pivot is at one half.
+        let grey = |x: f32| agx(Vec3::splat(x));
+        assert!((grey(0.18) - 0.5).abs().max_element() < 1e-4, "{}", grey(0.18));
+        assert!(grey(0.18 * 2_f32.powi(-10)).abs().max_element() < 1e-4);
+        assert!((grey(0.18 * 2_f32.powf(6.5)) - 1.0).abs().max_element() < 1e-4);
+        assert!(view(ViewTransform::Agx, 0.0).apply(Vec3::ZERO).max_element() < 1e-6);
+        // Slope 2 at the pivot, in log2 units of 16.5 stops.
+        let step = 0.1_f32;
+        let slope = (grey(0.18 * step.exp2()).x - grey(0.18 * (-step).exp2()).x) / (2.0 * step / 16.5);
+        assert!((slope - 2.0).abs() < 0.01, "{slope}");
+    }
+
+    #[test]
+    fn every_transform_keeps_order_and_range() {
+        for transform in ViewTransform::ALL {
+            let v = view(transform, 0.0);
+            let mut last = -1.0;
+            for i in 0..400 {
+                let c = v.apply(Vec3::splat(1e-4 * 1.04_f32.powi(i)));
+                assert!(c.min_element() >= 0.0 && c.max_element() <= 1.0);
+                assert!(c.x >= last, "{transform}: brighter must not come out darker");
+                last = c.x;
+            }
+            for broken in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0, f32::MAX] {
+                let c = v.apply(Vec3::new(broken, 0.5, broken));
+                assert!(c.to_array().iter().all(|x| (0.0..=1.0).contains(x)), "{transform} of {broken}: {c}");
+            }
+        }
+    }
+
+    #[test]
+    fn exposure_counts_stops() {
+        for transform in ViewTransform::ALL {
+            let c = Vec3::new(0.1, 0.05, 0.2);
+            assert_eq!(view(transform, 2.0).apply(c), view(transform, 0.0).apply(4.0 * c));
+        }
+        assert_eq!(view(ViewTransform::None, -1.0).apply(Vec3::splat(0.5)), Vec3::splat(0.25));
+    }
+
+    #[test]
+    fn names_are_read_back() {
+        for transform in ViewTransform::ALL {
+            assert_eq!(transform.name().parse(), Ok(transform));
+        }
+        assert!("filmic".parse::<ViewTransform>().is_err());
+    }
+}

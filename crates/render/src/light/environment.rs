@@ -280,3 +280,219 @@ fn sanitised(pixels: Arc<[[f32; 3]]>) -> Arc<[[f32; 3]]> {
     // `max` answers 0 for NaN.
     pixels.iter().map(|p| p.map(|x| x.max(0.0).min(BRIGHTEST))).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A dim map with one bright texel, a dark half, a black one, and structure at the poles and the seam.
+    fn lamp() -> Environment {
+        let (width, height) = (16, 8);
+        let pixels = (0..width * height)
+            .map(|i| {
+                let (x, y) = (i % width, i / width);
+                let base = if x < 8 { 0.0 } else { 0.1 + 0.05 * y as f32 };
+                let lamp = if (x, y) == (3, 2) { 50.0 } else { 0.0 };
+                let pole = if y == 0 && x % 3 == 0 { 2.0 } else { 0.0 };
+                [base + lamp, base + 0.5 * lamp + pole, base]
+            })
+            .collect();
+        Environment::latlong(width, height, pixels, 0.7, Vec3::new(1.0, 0.5, 2.0)).unwrap()
+    }
+
+    /// The integral over the sphere by a fine grid, midpoint rule in u and in cos(theta).
+    fn integral(f: impl Fn(Vec3) -> f64) -> f64 {
+        let (n, m) = (720_u32, 720_u32);
+        let mut sum = 0.0;
+        for i in 0..n {
+            for j in 0..m {
+                let y = 1.0 - 2.0 * (f64::from(j) + 0.5) / f64::from(m);
+                let (s, c) = (std::f64::consts::TAU * (f64::from(i) + 0.5) / f64::from(n)).sin_cos();
+                let r = (1.0 - y * y).sqrt();
+                sum += f(Vec3::new((r * s) as f32, y as f32, (r * c) as f32));
+            }
+        }
+        sum * 4.0 * std::f64::consts::PI / f64::from(n * m)
+    }
+
+    fn environments() -> [(&'static str, Environment); 3] {
+        [
+            ("constant", Environment::constant(Vec3::new(0.5, 1.0, 0.25))),
+            ("map", lamp()),
+            ("studio", Environment::studio(1.0, Vec3::ONE)),
+        ]
+    }
+
+    #[test]
+    fn densities_integrate_to_one() {
+        for (name, e) in environments() {
+            let total = integral(|d| f64::from(e.pdf(d)));
+            assert!((total - 1.0).abs() < 5e-3, "{name}: {total}");
+        }
+    }
+
+    /// Wherever there is light, there is density: every light can be found by sampling.
+    #[test]
+    fn nothing_that_shines_is_out_of_reach() {
+        for (name, e) in environments() {
+            let dark = integral(|d| f64::from(u8::from(luminance(e.radiance(d)) > 0.0 && e.pdf(d) <= 0.0)));
+            assert_eq!(dark, 0.0, "{name}");
+        }
+    }
+
+    #[test]
+    fn samples_report_the_radiance_and_density_of_their_direction() {
+        for (name, e) in environments() {
+            // From 1: the first point is right at the pole, which has no longitude.
+            for i in 1..4096_u32 {
+                let u = [(i as f32 * 0.618_034).fract(), (i as f32 * 0.754_878).fract()];
+                let s = e.sample(u).unwrap();
+                assert!((s.direction.length() - 1.0).abs() < 1e-5);
+                let difference = (s.radiance - e.radiance(s.direction)).length();
+                assert!(difference <= 1e-3 * s.radiance.length() + 1e-3, "{name}: {s:?} {}", e.radiance(s.direction));
+                // Right at the border of two texels, rounding may take the neighbour's.
+                let near = [-1.0, 0.0, 1.0].iter().any(|k| {
+                    let d = (s.direction + Vec3::splat(*k * 1e-5)).normalize();
+                    (e.pdf(d) - s.pdf).abs() <= 1e-4 * s.pdf
+                });
+                assert!(near, "{name}: {} is not {}", s.pdf, e.pdf(s.direction));
+            }
+        }
+    }
+
+    /// The estimate radiance / pdf of the total light agrees with the sum over a grid and with `mean_radiance`.
+    #[test]
+    fn sampling_finds_all_the_light() {
+        for (name, e) in environments() {
+            let n = 1 << 16;
+            let mut sum = Vec3::ZERO;
+            for i in 0..n {
+                let u = [(i as f32 + 0.5) / n as f32, (i as u32).reverse_bits() as f32 / 4_294_967_296.0];
+                let s = e.sample(u).unwrap();
+                sum += s.radiance / s.pdf / n as f32;
+            }
+            for c in 0..3 {
+                let grid = integral(|d| f64::from(e.radiance(d)[c]));
+                let sampled = f64::from(sum[c]);
+                assert!((sampled - grid).abs() < 0.01 * grid, "{name} channel {c}: {sampled} is not {grid}");
+                let mean = f64::from(e.mean_radiance()[c]) * 4.0 * std::f64::consts::PI;
+                assert!((mean - grid).abs() < 0.01 * grid, "{name} channel {c}: mean {mean} is not {grid}");
+            }
+        }
+    }
+
+    /// Counts of samples over cells of the sphere against what the density says: chi-squared.
+    #[test]
+    fn samples_are_distributed_as_the_density_says() {
+        let (columns, rows) = (20_usize, 10_usize);
+        for (name, e) in environments() {
+            let cell = |d: Vec3| {
+                let column = (d.x.atan2(-d.z) / TAU).rem_euclid(1.0) * columns as f32;
+                let row = (1.0 - d.y) * 0.5 * rows as f32;
+                (column as usize).min(columns - 1) + columns * (row as usize).min(rows - 1)
+            };
+            let mut expected = vec![0.0; columns * rows];
+            let fine = 1440_u32;
+            for i in 0..fine * fine {
+                let y = 1.0 - 2.0 * (f64::from(i / fine) + 0.5) / f64::from(fine);
+                let (s, c) = (std::f64::consts::TAU * (f64::from(i % fine) + 0.5) / f64::from(fine)).sin_cos();
+                let r = (1.0 - y * y).sqrt();
+                let d = Vec3::new((r * s) as f32, y as f32, (r * c) as f32);
+                expected[cell(d)] += f64::from(e.pdf(d)) * 4.0 * std::f64::consts::PI / f64::from(fine * fine);
+            }
+            let n = 40_000_u32;
+            let mut counts = vec![0.0; columns * rows];
+            let mut state = 12345_u64;
+            let mut random = || {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                (state >> 40) as f32 / (1 << 24) as f32
+            };
+            for _ in 0..n {
+                counts[cell(e.sample([random(), random()]).unwrap().direction)] += 1.0;
+            }
+            let (mut chi, mut cells, mut pooled) = (0.0, 0.0, (0.0, 0.0));
+            for (count, share) in counts.iter().zip(&expected) {
+                let share = share * f64::from(n);
+                if share < 5.0 {
+                    pooled = (pooled.0 + count, pooled.1 + share);
+                } else {
+                    chi += (count - share).powi(2) / share;
+                    cells += 1.0;
+                }
+            }
+            if pooled.1 > 5.0 {
+                chi += (pooled.0 - pooled.1).powi(2) / pooled.1;
+                cells += 1.0;
+            }
+            // Chi-squared has this mean and standard deviation; 5 sigma.
+            let freedom: f64 = cells - 1.0;
+            assert!(chi < freedom + 5.0 * (2.0 * freedom).sqrt(), "{name}: {chi} for {freedom} degrees of freedom");
+        }
+    }
+
+    /// A map whose columns and rows are numbered, so that it can be read where something is.
+    fn numbered(rotation: f32) -> Environment {
+        let (width, height) = (360, 180);
+        let pixels = (0..width * height).map(|i| [(i % width) as f32 + 0.5, (i / width) as f32 + 0.5, 0.0]).collect();
+        Environment::latlong(width, height, pixels, rotation, Vec3::ONE).unwrap()
+    }
+
+    #[test]
+    fn directions_are_looked_up_by_the_stated_convention() {
+        let e = numbered(0.0);
+        let close = |d: Vec3, u: f32, v: f32| {
+            let r = e.radiance(d.normalize());
+            assert!((r.x - u).abs() < 0.01 && (r.y - v).abs() < 0.01, "{d}: {r}");
+        };
+        close(Vec3::X, 90.0, 90.0);
+        close(Vec3::Z, 180.0, 90.0);
+        close(Vec3::NEG_X, 270.0, 90.0);
+        close(Vec3::new(1.0, 1.0, -1.0).normalize(), 45.0, 54.7356);
+        // Round the seam it is the mean of the first and the last column.
+        assert!((e.radiance(Vec3::NEG_Z).x - 180.0).abs() < 0.01);
+        assert_eq!(e.radiance(Vec3::Y).y, 0.5);
+        assert_eq!(e.radiance(Vec3::NEG_Y).y, 179.5);
+    }
+
+    #[test]
+    fn rotation_is_counter_clockwise_seen_from_above() {
+        let angle = 0.8_f32;
+        let (still, turned) = (numbered(0.0), numbered(angle));
+        for d in [Vec3::new(0.3, 0.2, 0.9), Vec3::new(-0.8, -0.3, 0.1), Vec3::new(0.5, 0.5, -0.4)] {
+            let d = d.normalize();
+            let r = glam::Quat::from_rotation_y(angle) * d;
+            assert!((still.radiance(d) - turned.radiance(r)).length() < 0.05);
+        }
+        let s = turned.sample([0.3, 0.6]).unwrap();
+        assert!((s.radiance - turned.radiance(s.direction)).length() < 0.05);
+    }
+
+    #[test]
+    fn black_has_no_samples_and_broken_pixels_are_black() {
+        assert_eq!(Environment::constant(Vec3::ZERO).sample([0.5, 0.5]), None);
+        let bad: Arc<[[f32; 3]]> = Arc::new([[f32::NAN, -1.0, f32::NEG_INFINITY]; 8]);
+        let e = Environment::latlong(4, 2, bad, f32::NAN, Vec3::ONE).unwrap();
+        assert!(e.is_black());
+        assert_eq!(e.sample([0.5, 0.5]), None);
+        assert_eq!((e.radiance(Vec3::X), e.pdf(Vec3::X)), (Vec3::ZERO, 0.0));
+        assert!(Environment::latlong(4, 2, Arc::new([[1.0; 3]; 7]), 0.0, Vec3::ONE).is_err());
+        assert!(Environment::latlong(0, 0, Arc::new([]), 0.0, Vec3::ONE).is_err());
+    }
+
+    /// The studio is what it says: neutral, never black, and a white wall facing any way is neither dark nor burnt.
+    #[test]
+    fn the_studio_exposes_a_white_ball_well() {
+        let e = Environment::studio(0.0, Vec3::ONE);
+        let irradiance = |n: Vec3| integral(|d| f64::from(e.radiance(d).x * d.dot(n).max(0.0))) / std::f64::consts::PI;
+        for d in [Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Y, Vec3::NEG_Z] {
+            let r = e.radiance(d);
+            assert!(r.x == r.y && r.y == r.z && r.x > 0.05, "{d}: {r}");
+        }
+        let key = irradiance(Vec3::new(-0.55, 0.67, 0.5).normalize());
+        let front = irradiance(Vec3::Z);
+        let below = irradiance(Vec3::NEG_Y);
+        assert!((0.9..1.6).contains(&key), "towards the key light: {key}");
+        assert!((0.6..1.2).contains(&front), "facing the viewer: {front}");
+        assert!((0.15..0.6).contains(&below), "facing the floor: {below}");
+    }
+}

@@ -22,16 +22,17 @@ struct Panel {
     radiance: f32,
 }
 
+/// Placed for a camera in three-quarter view (30 degrees from +Z towards +X).
 const PANELS: [Panel; 5] = [
     // Key: upper left, in front.
-    Panel { azimuth: -48.0, elevation: 42.0, half_size: [30.0, 24.0], softness: 14.0, radiance: 6.0 },
+    Panel { azimuth: -22.0, elevation: 46.0, half_size: [26.0, 20.0], softness: 14.0, radiance: 6.6 },
     // Fill: right, lower, large and weak.
-    Panel { azimuth: 68.0, elevation: 18.0, half_size: [20.0, 34.0], softness: 16.0, radiance: 1.5 },
+    Panel { azimuth: 102.0, elevation: 14.0, half_size: [16.0, 36.0], softness: 16.0, radiance: 1.4 },
     // Rims: behind, on both sides.
-    Panel { azimuth: 152.0, elevation: 28.0, half_size: [11.0, 32.0], softness: 10.0, radiance: 4.0 },
-    Panel { azimuth: -138.0, elevation: 22.0, half_size: [9.0, 30.0], softness: 10.0, radiance: 2.5 },
+    Panel { azimuth: 178.0, elevation: 30.0, half_size: [10.0, 34.0], softness: 10.0, radiance: 4.0 },
+    Panel { azimuth: -104.0, elevation: 20.0, half_size: [8.0, 34.0], softness: 10.0, radiance: 2.6 },
     // Overhead.
-    Panel { azimuth: 0.0, elevation: 86.0, half_size: [38.0, 26.0], softness: 18.0, radiance: 2.2 },
+    Panel { azimuth: 30.0, elevation: 86.0, half_size: [30.0, 16.0], softness: 16.0, radiance: 1.4 },
 ];
 
 /// The studio as a map by longitude and latitude: width, height, pixels.
@@ -50,7 +51,8 @@ pub(super) fn bake() -> (usize, usize, Arc<[[f32; 3]]>) {
 
 /// The studio's radiance from a unit direction.
 fn radiance(d: Vec3) -> Vec3 {
-    let walls = if d.y >= 0.0 { 0.42 + 0.4 * d.y } else { 0.42 - 0.16 * smooth(-d.y / 0.9) };
+    // The walls are darkest a little below the horizon: a dark line in which metals show their shape.
+    let walls = if d.y >= 0.0 { 0.22 + 0.28 * smooth(d.y) } else { 0.22 + 0.13 * smooth(-d.y) };
     Vec3::splat(walls + PANELS.iter().map(|p| p.radiance * p.coverage(d)).sum::<f32>())
 }
 

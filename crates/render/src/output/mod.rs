@@ -145,3 +145,6 @@ fn atomically(path: &Path, write: impl FnOnce(&mut BufWriter<fs::File>) -> io::R
 fn other(error: impl std::error::Error + Send + Sync + 'static) -> io::Error {
     io::Error::other(error)
 }
+
+#[cfg(test)]
+mod tests;
