@@ -94,12 +94,17 @@ pub(crate) fn grouped(n: u64) -> String {
     let digits = n.to_string();
     let mut out = String::with_capacity(digits.len() * 4 / 3);
     for (i, d) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i) % 3 == 0 {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
             out.push(' ');
         }
         out.push(d);
     }
     out
+}
+
+/// `1 shape`, `2 shapes`.
+pub(crate) fn count(n: u64, noun: &str) -> String {
+    format!("{} {noun}{}", grouped(n), if n == 1 { "" } else { "s" })
 }
 
 /// 1234567 as `1.23M`: for speeds and large counts.
@@ -119,6 +124,7 @@ mod tests {
     #[test]
     fn counts_are_readable() {
         assert_eq!([0, 999, 1000, 1_234_567].map(grouped), ["0", "999", "1 000", "1 234 567"]);
+        assert_eq!([1, 2000].map(|n| count(n, "shape")), ["1 shape", "2 000 shapes"]);
         assert_eq!([0.0, 9999.0, 12_345.0, 1.5e6, 2e9].map(short), ["0", "9999", "12.3k", "1.50M", "2.00G"]);
     }
 

@@ -15,7 +15,8 @@ pub(crate) struct Interrupt {
 }
 
 impl Interrupt {
-    /// Listens for SIGINT, SIGTERM and SIGHUP (or their like) from now on.
+    /// Listens for Ctrl-C from now on. SIGTERM and SIGHUP keep their meaning: `nohup` works, and an image is written
+    /// whole or not at all anyway.
     pub(crate) fn listen() -> Self {
         let interrupt = Self::default();
         let heard = interrupt.clone();

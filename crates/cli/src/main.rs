@@ -9,6 +9,7 @@ mod hdri;
 mod inspect;
 mod interrupt;
 mod progress;
+mod render;
 mod report;
 mod target;
 mod values;
@@ -35,10 +36,7 @@ fn main() -> ExitCode {
 
 fn run(command: Command, config: Option<&std::path::Path>) -> Result<Exit, Failure> {
     match command {
-        Command::Render(_) => {
-            let _ = config;
-            Err(Failure::failed("rendering is not part of this build yet"))
-        }
+        Command::Render(args) => render::run(&args, config),
         Command::Inspect(args) => inspect::run(&args).map(|()| Exit::Done),
         Command::Completions { shell } => {
             let mut script = Vec::new();
@@ -48,6 +46,7 @@ fn run(command: Command, config: Option<&std::path::Path>) -> Result<Exit, Failu
         Command::Man { command } => {
             let mut page = Vec::new();
             clap_mangen::Man::new(manual(command.as_deref()))
+                .source(concat!("firsthit ", env!("CARGO_PKG_VERSION")))
                 .render(&mut page)
                 .map_err(|e| Failure::failed(format_args!("manual page: {e}")))?;
             console::print(&page).map(|()| Exit::Done)

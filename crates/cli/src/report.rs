@@ -1,12 +1,14 @@
 //! What is printed about a render: JSON for programs, lines for people.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
-use firsthit_import::Report;
+use firsthit_import::scene::SurfaceDesc;
+use firsthit_import::{Report, SceneDesc};
 use firsthit_render::{EffectEntry, EffectPlan, RayCounts};
 use serde::Serialize;
 
-use crate::console::short;
+use crate::console::{count, short};
 
 /// The JSON of `render --json`.
 #[derive(Serialize)]
@@ -25,6 +27,8 @@ pub(crate) struct RenderReport<'a> {
     pub(crate) precision: &'static str,
     /// Triangles of the scene as seen: every instance counted.
     pub(crate) triangles: u64,
+    /// Analytic shapes, every instance counted.
+    pub(crate) shapes: u64,
     pub(crate) instances: u64,
     pub(crate) seconds: Seconds,
     /// Rays cast, by kind.
@@ -39,6 +43,39 @@ pub(crate) struct RenderReport<'a> {
     pub(crate) warnings: Vec<String>,
     /// Warnings beyond those listed.
     pub(crate) more_warnings: u64,
+}
+
+/// What a scene shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Counts {
+    /// Triangles, every instance counted.
+    pub(crate) triangles: u64,
+    /// Analytic shapes, every instance counted.
+    pub(crate) shapes: u64,
+    pub(crate) instances: u64,
+}
+
+impl Counts {
+    pub(crate) fn new(scene: &SceneDesc) -> Self {
+        let mut counts = Self { instances: scene.instances.len() as u64, ..Self::default() };
+        for geometry in scene.instances.iter().flat_map(|i| &scene.meshes[i.mesh].geometries) {
+            match &geometry.surface {
+                SurfaceDesc::Triangles(mesh) => counts.triangles += mesh.triangles.len() as u64,
+                SurfaceDesc::Shape(_) => counts.shapes += 1,
+            }
+        }
+        counts
+    }
+}
+
+impl fmt::Display for Counts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.triangles, self.shapes) {
+            (_, 0) => f.write_str(&count(self.triangles, "triangle")),
+            (0, _) => f.write_str(&count(self.shapes, "shape")),
+            _ => write!(f, "{}, {}", count(self.triangles, "triangle"), count(self.shapes, "shape")),
+        }
+    }
 }
 
 /// Wall-clock seconds of each step.
@@ -60,8 +97,10 @@ pub(crate) struct Effect<'a> {
     pub(crate) called_for: bool,
     by: &'a [String],
     simulated: bool,
+    /// Rays cast for it alone; absent before rendering.
     #[serde(skip_serializing_if = "Option::is_none")]
     rays: Option<u64>,
+    /// Processor seconds in those rays; absent where they were not measured apart.
     #[serde(skip_serializing_if = "Option::is_none")]
     seconds: Option<f64>,
 }
@@ -105,9 +144,12 @@ pub(crate) fn explain_effects(plan: &EffectPlan) -> Vec<String> {
             (false, true) => ("added", "by --effects".into()),
             (false, false) => ("no", "not called for".into()),
         };
-        let rays = e.rays.filter(|&n| n > 0).map_or_else(String::new, |n| format!("; {} rays", short(n as f64)));
-        let time = e.seconds.map_or_else(String::new, |s| format!(", {s:.2} s"));
-        format!("  {:18} {verdict:8} {by}{rays}{time}", e.name)
+        let cost = match (e.rays, e.seconds) {
+            (Some(0) | None, _) => String::new(),
+            (Some(n), None) => format!("; {} rays", short(n as f64)),
+            (Some(n), Some(s)) => format!("; {} rays, {s:.2} s", short(n as f64)),
+        };
+        format!("  {:18} {verdict:8} {by}{cost}", e.name)
     };
     std::iter::once("effects:".into()).chain(effects(plan).iter().map(line)).collect()
 }

@@ -162,7 +162,9 @@ impl EffectPlan {
                 .iter()
                 .filter(|&&k| rays[k] > 0)
                 .map(|&k| seconds_per_ray(k).map(|s| s * rays[k] as f64))
-                .sum::<Option<f64>>();
+                .sum::<Option<f64>>()
+                // The sum of nothing is -0.
+                .map(f64::abs);
         }
         plan
     }

@@ -2,17 +2,20 @@
 
 mod text;
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use firsthit_accel::{BuildOptions, Scene, SceneBuilder};
+use firsthit_geometry::mesh::MeshReport;
 use firsthit_import::scene::{AlphaMode, LightKind, MaterialModel, MeshDesc, PbrMaterial, Projection, SurfaceDesc};
 use firsthit_import::{Imported, Report, SceneDesc};
+use firsthit_render::{EffectPlan, Stage, StageOptions};
 use serde::Serialize;
 
 use crate::args::InspectArgs;
 use crate::console::{Console, print, print_json};
 use crate::error::Failure;
-use crate::report::warnings;
+use crate::report::{Counts, Effect, effects, warnings};
 
 /// Looks at a model and prints what is in it.
 pub(crate) fn run(args: &InspectArgs) -> Result<(), Failure> {
@@ -28,9 +31,11 @@ pub(crate) fn run(args: &InspectArgs) -> Result<(), Failure> {
     let trees = SceneBuilder::from_desc(&scene, options).build().map_err(|e| at_model(args, &e))?;
     let build = started.elapsed().as_secs_f64();
 
+    let scene = Arc::new(scene);
+    let stage = Stage::new(scene.clone(), trees.clone(), &StageOptions::default()).map_err(|e| at_model(args, &e))?;
     let model = args.model.display().to_string();
     let seconds = Seconds { load, build };
-    let inspection = Inspection::new(model, &scene, &report, &trees, seconds);
+    let inspection = Inspection::new(model, &scene, &report, &trees, stage.plan(), stage.explain(), seconds);
     if args.json { print_json(&inspection) } else { print(inspection.to_string().as_bytes()) }
 }
 
@@ -48,6 +53,8 @@ struct Inspection<'a> {
     triangles_all_scenes: u64,
     /// Each mesh counted once.
     stored_triangles: u64,
+    /// Triangles without area, each mesh counted once.
+    degenerate_triangles: u64,
     /// Analytic shapes, each instance counted.
     shapes: u64,
     meshes: usize,
@@ -66,6 +73,9 @@ struct Inspection<'a> {
     camera_list: Vec<Named<'a>>,
     extensions: Vec<Extension<'a>>,
     bvh: Bvh,
+    effects: Vec<Effect<'a>>,
+    /// Which camera and light a render without options would choose, and why.
+    choices: &'a [String],
     warnings: Vec<String>,
     /// Warnings beyond those listed.
     more_warnings: u64,
@@ -87,6 +97,16 @@ struct Mesh<'a> {
     triangles: u64,
     vertices: u64,
     shapes: u64,
+    /// Triangles without area.
+    degenerate: u64,
+    /// Whether its triangles, all geometries together, enclose space: every edge has two sides. Absent without any.
+    closed: Option<bool>,
+    /// Edges with an odd number of triangles.
+    boundary_edges: u64,
+    /// Whether no edge has more than two triangles.
+    manifold: Option<bool>,
+    /// Whether neighbours agree about what is outside.
+    oriented: Option<bool>,
 }
 
 #[derive(Serialize)]
@@ -136,17 +156,27 @@ struct Seconds {
 }
 
 impl<'a> Inspection<'a> {
-    fn new(model: String, scene: &'a SceneDesc, report: &'a Report, trees: &Scene, seconds: Seconds) -> Self {
+    fn new(
+        model: String,
+        scene: &'a SceneDesc,
+        report: &'a Report,
+        trees: &Scene,
+        plan: &'a EffectPlan,
+        choices: &'a [String],
+        seconds: Seconds,
+    ) -> Self {
         let mesh_list = meshes(scene);
         let stats = trees.stats();
         let bounds = trees.bounds();
-        let total = |count: fn(&Mesh<'_>) -> u64| mesh_list.iter().map(|m| count(m)).sum();
+        let total = |count: fn(&Mesh<'_>) -> u64| mesh_list.iter().map(count).sum();
+        let counts = Counts::new(scene);
         Self {
             model,
-            triangles: total(|m| m.triangles * m.instances),
+            triangles: counts.triangles,
             triangles_all_scenes: report.triangles_all_scenes,
             stored_triangles: total(|m| m.triangles),
-            shapes: total(|m| m.shapes * m.instances),
+            degenerate_triangles: total(|m| m.degenerate),
+            shapes: counts.shapes,
             meshes: scene.meshes.len(),
             instances: scene.instances.len(),
             materials: scene.materials.len(),
@@ -173,6 +203,8 @@ impl<'a> Inspection<'a> {
                 .map(|e| Extension { name: &e.name, required: e.required, support: e.support.name(), note: e.note })
                 .collect(),
             bvh: Bvh { sah_cost: stats.sah_cost, depth: stats.depth, bytes: stats.bytes },
+            effects: effects(plan),
+            choices,
             warnings: warnings(report),
             more_warnings: report.more_warnings,
             seconds,
@@ -203,6 +235,7 @@ impl<'a> Mesh<'a> {
                 SurfaceDesc::Shape(_) => shapes += 1,
             }
         }
+        let report = (!triangles.is_empty()).then(|| MeshReport::new(&positions, &triangles));
         Self {
             name: &mesh.name,
             geometries: mesh.geometries.len(),
@@ -210,6 +243,11 @@ impl<'a> Mesh<'a> {
             triangles: triangles.len() as u64,
             vertices: positions.len() as u64,
             shapes,
+            degenerate: report.map_or(0, |r| r.degenerate),
+            closed: report.map(|r| r.is_closed()),
+            boundary_edges: report.map_or(0, |r| r.boundary_edges),
+            manifold: report.map(|r| r.is_manifold()),
+            oriented: report.map(|r| r.is_oriented()),
         }
     }
 }

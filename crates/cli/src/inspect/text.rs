@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::{Bounds, Inspection, Mesh};
-use crate::console::grouped;
+use crate::console::{count, grouped};
 
 /// Entries of each list that are printed; JSON has all.
 const SHOWN: usize = 16;
@@ -20,6 +20,9 @@ impl fmt::Display for Inspection<'_> {
         if self.triangles_all_scenes != self.triangles {
             triangles += &format!(", {} in all scenes", grouped(self.triangles_all_scenes));
         }
+        if self.degenerate_triangles > 0 {
+            triangles += &format!(", {} without area", grouped(self.degenerate_triangles));
+        }
         row(f, "triangles", triangles)?;
         if self.shapes > 0 {
             row(f, "shapes", grouped(self.shapes))?;
@@ -30,11 +33,8 @@ impl fmt::Display for Inspection<'_> {
         list(f, &self.mesh_list, |m| (m.name, mesh(m)))?;
         row(f, "materials", grouped(self.materials as u64))?;
         list(f, &self.material_list, |m| {
-            let textures = match m.textures {
-                0 => String::new(),
-                1 => ", 1 texture".into(),
-                n => format!(", {n} textures"),
-            };
+            let textures =
+                if m.textures == 0 { String::new() } else { format!(", {}", count(m.textures as u64, "texture")) };
             let alpha = if m.alpha == "opaque" { String::new() } else { format!(", alpha {}", m.alpha) };
             (m.name, format!("{}{textures}{alpha}{}", m.kind, if m.double_sided { "" } else { ", single-sided" }))
         })?;
@@ -55,6 +55,12 @@ impl fmt::Display for Inspection<'_> {
         })?;
         let bytes = grouped(self.bvh.bytes);
         row(f, "tree", format!("SAH cost {:.1}, depth {}, {bytes} bytes", self.bvh.sah_cost, self.bvh.depth))?;
+        let called = self.effects.iter().filter(|e| e.called_for);
+        row(f, "effects", grouped(called.clone().count() as u64))?;
+        list(f, &called.collect::<Vec<_>>(), |e| (e.name, e.by_in_words()))?;
+        for choice in self.choices {
+            row(f, "", choice.clone())?;
+        }
         row(f, "warnings", grouped(self.warnings.len() as u64 + self.more_warnings))?;
         for warning in self.warnings.iter().take(SHOWN) {
             writeln!(f, "    {warning}")?;
@@ -87,13 +93,27 @@ fn more(f: &mut fmt::Formatter<'_>, count: u64) -> fmt::Result {
 fn mesh(m: &Mesh<'_>) -> String {
     let mut parts = Vec::new();
     if m.triangles > 0 {
-        parts.push(format!("{} triangles", grouped(m.triangles)));
+        parts.push(count(m.triangles, "triangle"));
     }
     if m.shapes > 0 {
-        parts.push(format!("{} shapes", grouped(m.shapes)));
+        parts.push(count(m.shapes, "shape"));
     }
     if m.instances != 1 {
-        parts.push(format!("{} instances", grouped(m.instances)));
+        parts.push(count(m.instances, "instance"));
+    }
+    match m.closed {
+        Some(true) => parts.push("closed".into()),
+        Some(false) => parts.push(format!("open ({})", count(m.boundary_edges, "boundary edge"))),
+        None => {}
+    }
+    if m.manifold == Some(false) {
+        parts.push("not manifold".into());
+    }
+    if m.oriented == Some(false) {
+        parts.push("not consistently oriented".into());
+    }
+    if m.degenerate > 0 {
+        parts.push(format!("{} without area", grouped(m.degenerate)));
     }
     parts.join(", ")
 }
@@ -107,11 +127,8 @@ impl fmt::Display for Bounds {
 
 /// Six significant digits: models are as small as 1e-6 and as far away as 1e7.
 fn significant(x: f64) -> String {
-    let size = if x == 0.0 { 0 } else { x.abs().log10().floor() as i32 };
-    match size {
-        -4..=5 => format!("{x:.*}", (5 - size) as usize),
-        _ => format!("{x:.5e}"),
-    }
+    let rounded: f64 = format!("{x:.5e}").parse().unwrap_or(x);
+    if rounded == 0.0 || (1e-5..1e9).contains(&rounded.abs()) { format!("{rounded}") } else { format!("{rounded:e}") }
 }
 
 #[cfg(test)]
@@ -121,6 +138,6 @@ mod tests {
     #[test]
     fn bounds_keep_six_digits_at_any_scale() {
         let texts = [0.0, 1.0, -12.3456789, 0.000123456789, 1e7, 1.23456789e-6].map(significant);
-        assert_eq!(texts, ["0.00000", "1.00000", "-12.3457", "0.000123457", "1.00000e7", "1.23457e-6"]);
+        assert_eq!(texts, ["0", "1", "-12.3457", "0.000123457", "10000000", "1.23457e-6"]);
     }
 }

@@ -1,0 +1,233 @@
+//! `firsthit render`: from a model to an image.
+
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+use firsthit_accel::{BuildOptions, SceneBuilder};
+use firsthit_import::Imported;
+use firsthit_import::scene::Settings;
+use firsthit_render::{
+    Background, CameraChanges, Clip, RenderOptions, Rendered, Stage, StageOptions, View,
+    output::{BitDepth, WriteOptions, write_film, write_png},
+};
+
+use crate::args::{CameraArgs, RenderArgs};
+use crate::console::{Console, grouped, message, print_json};
+use crate::error::{Exit, Failure};
+use crate::hdri;
+use crate::interrupt::Interrupt;
+use crate::progress::{Progress, Style};
+use crate::report::{Counts, RenderReport, Seconds, effects, explain_effects, rays_in_words, warnings};
+use crate::target::Target;
+use crate::values::Resolution;
+
+/// Renders a model as the arguments say.
+pub(crate) fn run(args: &RenderArgs, config: Option<&Path>) -> Result<Exit, Failure> {
+    let console = Console::new(args.run.quiet, args.run.verbose);
+    let target = Target::new(args.output.output.as_deref(), &args.model)?;
+    if target == Target::Stdout && args.run.json {
+        let failure = Failure::usage("`-o -` and `--json` both want the standard output");
+        return Err(failure.hint("write the image to a file: -o FILE"));
+    }
+    if target == Target::Stdout && args.output.aov.is_some() {
+        let failure = Failure::usage("`-o -` has no room for `--aov`");
+        return Err(failure.hint("write to a file: -o FILE.exr holds them all"));
+    }
+    if let Some(path) = config {
+        console.say(format_args!("options from {}", path.display()));
+    }
+    let mut pool = rayon::ThreadPoolBuilder::new();
+    if let Some(threads) = args.run.threads {
+        pool = pool.num_threads(threads.into());
+    }
+    let pool = pool.build().map_err(|e| Failure::failed(format_args!("threads: {e}")))?;
+    let interrupt = Interrupt::listen();
+    pool.install(|| Job { args, console, target, interrupt }.run())
+}
+
+/// One render.
+struct Job<'a> {
+    args: &'a RenderArgs,
+    console: Console,
+    target: Target,
+    interrupt: Interrupt,
+}
+
+impl Job<'_> {
+    fn run(&self) -> Result<Exit, Failure> {
+        let mut seconds = Seconds::default();
+        let args = self.args;
+
+        let started = Instant::now();
+        self.console.detail(format_args!("reading {}", args.model.display()));
+        let options = firsthit_import::Options { up: args.scene.up, ..Default::default() };
+        let Imported { scene, report } = firsthit_import::open(&args.model, &options)?;
+        self.console.warnings(&report, args.run.strict)?;
+        let options = render_options(args, &scene.settings)?;
+        let stage_options = stage_options(args, &options)?;
+        seconds.load = started.elapsed().as_secs_f64();
+
+        let started = Instant::now();
+        self.console.detail("building trees");
+        let build = BuildOptions { precision: args.quality.precision, ..Default::default() };
+        let trees = SceneBuilder::from_desc(&scene, build).build().map_err(|e| self.at_model(&e))?;
+        let counts = Counts::new(&scene);
+        let stage = Stage::new(Arc::new(scene), trees, &stage_options).map_err(|e| self.at_model(&e))?;
+        seconds.build = started.elapsed().as_secs_f64();
+        if args.run.explain {
+            stage.explain().iter().for_each(message);
+        } else {
+            stage.explain().iter().for_each(|line| self.console.detail(line));
+        }
+
+        let started = Instant::now();
+        self.interrupt.begin_rendering();
+        let style = Style::new(args.run.progress, args.run.no_progress, args.run.quiet);
+        let progress = Progress::new(style, self.interrupt.clone());
+        let rendered = firsthit_render::render(&stage, &options, &progress);
+        progress.finish();
+        let rendered = rendered.map_err(|e| self.at_model(&e))?;
+        seconds.render = started.elapsed().as_secs_f64();
+
+        let started = Instant::now();
+        let files = self.write(&rendered)?;
+        seconds.write = started.elapsed().as_secs_f64();
+
+        let bad = rendered.stats.bad_samples;
+        if bad > 0 {
+            self.console.say(format_args!("warning: {} samples were not finite and count as black", grouped(bad)));
+        }
+        if args.run.explain {
+            explain_effects(&rendered.effects).iter().for_each(message);
+        }
+        self.console.say(self.summary(&rendered, counts, seconds));
+        if args.run.json {
+            let picture = rendered.film.window();
+            print_json(&RenderReport {
+                output: self.target.name(),
+                aov_files: files.iter().skip(1).map(|f| f.display().to_string()).collect(),
+                model: args.model.display().to_string(),
+                width: picture.width,
+                height: picture.height,
+                spp: options.spp,
+                max_depth: options.max_depth,
+                seed: options.seed,
+                threads: rayon::current_num_threads(),
+                precision: args.quality.precision.name(),
+                triangles: counts.triangles,
+                shapes: counts.shapes,
+                instances: counts.instances,
+                seconds,
+                rays: rendered.stats.rays.by_name().into_iter().collect(),
+                samples: rendered.stats.samples,
+                bad_samples: rendered.stats.bad_samples,
+                interrupted: rendered.interrupted,
+                effects: effects(&rendered.effects),
+                choices: stage.explain(),
+                warnings: warnings(&report),
+                more_warnings: report.more_warnings,
+            })?;
+        }
+        Ok(if rendered.interrupted { Exit::Interrupted } else { Exit::Done })
+    }
+
+    /// Writes the image and what belongs to it; the answer: the files, the image first.
+    fn write(&self, rendered: &Rendered) -> Result<Vec<PathBuf>, Failure> {
+        let output = &self.args.output;
+        let view = View { transform: output.tone_mapping, exposure: output.exposure as f32 };
+        let bit_depth = if output.bit_depth == 16 { BitDepth::Sixteen } else { BitDepth::Eight };
+        match &self.target {
+            Target::File(path) => {
+                write_film(path, &rendered.film, &WriteOptions { view, bit_depth }).map_err(Failure::failed)
+            }
+            Target::Stdout => {
+                let mut out = BufWriter::new(io::stdout().lock());
+                write_png(&mut out, &rendered.film.color(), &view, bit_depth)
+                    .and_then(|()| out.flush())
+                    .map_err(|e| Failure::failed(format_args!("standard output: {e}")))?;
+                Ok(Vec::new())
+            }
+        }
+    }
+
+    /// What was done, in one line.
+    fn summary(&self, rendered: &Rendered, counts: Counts, seconds: Seconds) -> String {
+        let done = if rendered.interrupted { "interrupted, image so far" } else { "done" };
+        format!(
+            "{done}: {counts}, {}; load {:.2} s, build {:.2} s, render {:.2} s; wrote {}",
+            rays_in_words(&rendered.stats.rays),
+            seconds.load,
+            seconds.build,
+            seconds.render,
+            self.target.name(),
+        )
+    }
+
+    fn at_model(&self, error: &dyn std::error::Error) -> Failure {
+        Failure::failed(format_args!("{}: {error}", self.args.model.display()))
+    }
+}
+
+/// How to render: the options, where they are silent the scene file, else the defaults.
+fn render_options(args: &RenderArgs, settings: &Settings) -> Result<RenderOptions, Failure> {
+    let defaults = RenderOptions::default();
+    let Resolution { width, height } = match (args.output.resolution, settings.resolution) {
+        (Some(resolution), _) => resolution,
+        (None, Some((width, height))) => Resolution { width, height },
+        (None, None) => Resolution { width: defaults.width, height: defaults.height },
+    };
+    if let Some(crop) = args.output.crop {
+        let inside = |start: u32, size: u32, end: u32| start.checked_add(size).is_some_and(|sum| sum <= end);
+        if !inside(crop.x, crop.width, width) || !inside(crop.y, crop.height, height) {
+            return Err(Failure::usage(format_args!("--crop: the window leaves the image of {width}x{height}")));
+        }
+    }
+    let file_depth = settings.max_path_edges.map(|edges| edges.saturating_sub(1));
+    Ok(RenderOptions {
+        width,
+        height,
+        spp: args.quality.spp,
+        max_depth: args.quality.max_depth.or(file_depth).unwrap_or(defaults.max_depth),
+        seed: args.quality.seed,
+        integrator: args.quality.integrator,
+        crop: args.output.crop,
+        aovs: args.output.aov.as_ref().map_or_else(Vec::new, |list| list.0.clone()),
+        clip: Clip {
+            bounds: args.scene.clip_box,
+            planes: args.scene.clip_plane.iter().map(|p| (p.normal, p.offset)).collect(),
+        },
+    })
+}
+
+/// What the scene is set up with.
+fn stage_options(args: &RenderArgs, render: &RenderOptions) -> Result<StageOptions, Failure> {
+    let scene = &args.scene;
+    Ok(StageOptions {
+        environment: hdri::environment(scene.hdri.as_ref())?,
+        environment_rotation: scene.hdri_rotation.to_radians() as f32,
+        background: match (scene.background_color, scene.no_background) {
+            (_, true) => Background::Transparent,
+            (Some(color), false) => Background::Color(color.0),
+            (None, false) => Background::Auto,
+        },
+        effects: args.quality.effects,
+        camera: args.camera.camera.clone(),
+        camera_changes: camera_changes(&args.camera),
+        aspect: f64::from(render.width) / f64::from(render.height),
+    })
+}
+
+fn camera_changes(args: &CameraArgs) -> CameraChanges {
+    CameraChanges {
+        position: args.camera_position,
+        focal_point: args.camera_focal_point,
+        view_up: args.camera_view_up,
+        view_angle: args.camera_view_angle.map(f64::to_radians),
+        azimuth: args.camera_azimuth_angle.to_radians(),
+        elevation: args.camera_elevation_angle.to_radians(),
+        zoom: args.camera_zoom_factor,
+        orthographic: args.camera_orthographic,
+    }
+}
