@@ -11,7 +11,31 @@ use crate::{ErrorKind, ImportError};
 /// How components are stored: the type, and whether integers stand for fractions.
 pub(super) type Format = (ComponentType, bool);
 
-/// A checked accessor: all its elements lie inside their buffers.
+/// What an accessor says, checked: all its elements lie inside their buffer views.
+pub(super) struct Layout {
+    count: u64,
+    kind: Type,
+    format: Format,
+    data: Option<Elements>,
+    sparse: Option<SparseLayout>,
+}
+
+struct SparseLayout {
+    place: String,
+    component: ComponentType,
+    indices: Elements,
+    values: Elements,
+}
+
+/// Elements in a buffer view.
+struct Elements {
+    view: Index<json::buffer::View>,
+    offset: u64,
+    stride: u64,
+    count: u64,
+}
+
+/// An accessor with its data.
 pub(super) struct Accessor<'a> {
     /// Number of elements.
     pub(super) count: usize,
@@ -39,12 +63,12 @@ struct Sparse<'a> {
 /// More zeros than any file has a use for: they cost the file nothing, but the reader memory.
 const MOST_ZEROS: u64 = 1 << 24;
 
-impl<'a> Accessor<'a> {
-    /// Checks an accessor.
+impl Layout {
+    /// Checks an accessor without looking at its data.
     ///
     /// # Errors
     /// If an element lies outside its buffer view, or the accessor says something that makes no sense.
-    pub(super) fn new(source: &'a Source<'_>, index: Index<json::Accessor>) -> Result<Self, ImportError> {
+    pub(super) fn new(source: &Source<'_>, index: Index<json::Accessor>) -> Result<Self, ImportError> {
         let i = index.value();
         let place = format!("/accessors/{i}");
         let json = &source.root.accessors[i];
@@ -56,30 +80,92 @@ impl<'a> Accessor<'a> {
         };
         let component = component.0;
         let count = json.count.0;
-        if count > source.limits.elements {
-            let cause = format!("{count} elements are more than the limit of {}", source.limits.elements);
+        let limit = if json.buffer_view.is_some() { u64::MAX } else { MOST_ZEROS };
+        let limit = limit.min(source.limits.elements);
+        if count > limit {
+            let cause = format!("{count} elements are more than the limit of {limit}");
             return Err(source.at(place + "/count", ErrorKind::Limit(cause)));
         }
-        let size = element_size(kind, component);
+        let (size, pitch) = element_size(kind, component);
         let data = match json.buffer_view {
             Some(view) => {
+                let stride = stride(source, view, pitch)?;
                 let offset = json.byte_offset.map_or(0, |o| o.0);
-                let stride = stride(source, view, size)?;
-                Some(strided(source, &place, view, offset, stride, count, size)?)
-            }
-            None if count > MOST_ZEROS => {
-                let cause = format!("{count} elements without data are more than the limit of {MOST_ZEROS}");
-                return Err(source.at(place + "/count", ErrorKind::Limit(cause)));
+                Some(Elements { view, offset, stride, count }.checked(source, &place, size)?)
             }
             None => None,
         };
-        let sparse = match &json.sparse {
-            Some(sparse) => Some(Sparse::new(source, &(place + "/sparse"), sparse, count, size)?),
-            None => None,
-        };
+        let sparse = json.sparse.as_ref().map(|s| SparseLayout::new(source, place + "/sparse", s, count, size, pitch));
         // Floats are never normalised, whatever the file says.
         let normalized = json.normalized && component != ComponentType::F32;
-        Ok(Self { count: count as usize, kind, format: (component, normalized), data, sparse })
+        Ok(Self { count, kind, format: (component, normalized), data, sparse: sparse.transpose()? })
+    }
+}
+
+impl SparseLayout {
+    fn new(
+        source: &Source<'_>,
+        place: String,
+        json: &json::accessor::sparse::Sparse,
+        elements: u64,
+        size: u64,
+        pitch: u64,
+    ) -> Result<Self, ImportError> {
+        let count = json.count.0;
+        if count > elements {
+            let cause = format!("{count} elements are replaced, but there are {elements}");
+            return Err(source.invalid(place + "/count", cause));
+        }
+        let Checked::Valid(component) = json.indices.component_type else {
+            return Err(source.invalid(place + "/indices/componentType", "indices are of type 5121, 5123 or 5125"));
+        };
+        let (component, width) = (component.0, component.0.size() as u64);
+        let (view, offset) = (json.indices.buffer_view, json.indices.byte_offset.0);
+        let indices = Elements { view, offset, stride: width, count };
+        let indices = indices.checked(source, &format!("{place}/indices"), width)?;
+        let (view, offset) = (json.values.buffer_view, json.values.byte_offset.0);
+        let values = Elements { view, offset, stride: pitch, count };
+        let values = values.checked(source, &format!("{place}/values"), size)?;
+        Ok(Self { place, component, indices, values })
+    }
+}
+
+impl Elements {
+    /// Checks that elements of `size` bytes lie inside the buffer view.
+    fn checked(self, source: &Source<'_>, place: &str, size: u64) -> Result<Self, ImportError> {
+        let available = source.check_view(self.view)?.len() as u64;
+        let Self { view, offset, stride, count } = self;
+        let needed = match count.checked_sub(1) {
+            None => Some(0),
+            Some(steps) => steps.checked_mul(stride).and_then(|n| n.checked_add(size)),
+        };
+        if needed.and_then(|n| n.checked_add(offset)).is_none_or(|end| end > available) {
+            let cause = format!(
+                "{count} elements of {size} bytes, {stride} apart, from byte {offset} leave buffer view {}, which has \
+                 {available}",
+                view.value()
+            );
+            return Err(source.invalid(place, cause));
+        }
+        Ok(self)
+    }
+
+    fn data<'a>(&self, source: &'a Source<'_>) -> Result<Strided<'a>, ImportError> {
+        // An empty accessor may have its offset at the very end.
+        Ok(Strided { bytes: &source.view(self.view)?[self.offset as usize..], stride: self.stride as usize })
+    }
+}
+
+impl<'a> Accessor<'a> {
+    /// Checks an accessor and finds its data.
+    ///
+    /// # Errors
+    /// As [`Layout::new`], and if its buffer has no data.
+    pub(super) fn new(source: &'a Source<'_>, index: Index<json::Accessor>) -> Result<Self, ImportError> {
+        let Layout { count, kind, format, data, sparse } = Layout::new(source, index)?;
+        let data = data.map(|d| d.data(source)).transpose()?;
+        let sparse = sparse.map(|s| Sparse::new(source, &s, count)).transpose()?;
+        Ok(Self { count: count as usize, kind, format, data, sparse })
     }
 
     /// Vectors of `N` floats, normalised integers unpacked as the specification's section 3.11 says.
@@ -137,90 +223,40 @@ impl<'a> Accessor<'a> {
 }
 
 impl<'a> Sparse<'a> {
-    fn new(
-        source: &'a Source<'_>,
-        place: &str,
-        json: &json::accessor::sparse::Sparse,
-        elements: u64,
-        size: u64,
-    ) -> Result<Self, ImportError> {
-        let count = json.count.0;
-        if count > elements {
-            let cause = format!("{count} elements are replaced, but there are {elements}");
-            return Err(source.invalid(format!("{place}/count"), cause));
-        }
-        let at = format!("{place}/indices");
-        let Checked::Valid(component) = json.indices.component_type else {
-            return Err(source.invalid(at + "/componentType", "indices are of type 5121, 5123 or 5125"));
-        };
-        let (component, indices) = (component.0, &json.indices);
-        let width = component.size() as u64;
-        let data = strided(source, &at, indices.buffer_view, indices.byte_offset.0, width, count, width)?;
-        let array = Accessor {
-            count: count as usize,
+    fn new(source: &'a Source<'_>, layout: &SparseLayout, elements: u64) -> Result<Self, ImportError> {
+        let indices = Accessor {
+            count: layout.indices.count as usize,
             kind: Type::Scalar,
-            format: (component, false),
-            data: Some(data),
+            format: (layout.component, false),
+            data: Some(layout.indices.data(source)?),
             sparse: None,
         };
-        let places: Vec<u32> = array.integers::<1>().into_iter().flatten().collect();
+        let places = indices.integers::<1>().as_flattened().to_vec();
+        let invalid = |cause| Err(source.invalid(format!("{}/indices", layout.place), cause));
         if let Some(k) = (1..places.len()).find(|&k| places[k] <= places[k - 1]) {
-            let cause = format!("index {} after {} (number {k}) does not increase", places[k], places[k - 1]);
-            return Err(source.invalid(at, cause));
+            return invalid(format!("index {} after {} (number {k}) does not increase", places[k], places[k - 1]));
         }
         if let Some(&last) = places.last().filter(|&&last| u64::from(last) >= elements) {
-            return Err(source.invalid(at, format!("index {last} is out of range: there are {elements} elements")));
+            return invalid(format!("index {last} is out of range: there are {elements} elements"));
         }
-        let at = format!("{place}/values");
-        let values = strided(source, &at, json.values.buffer_view, json.values.byte_offset.0, size, count, size)?;
-        Ok(Self { places, values })
+        Ok(Self { places, values: layout.values.data(source)? })
     }
 }
 
 /// Bytes from one element to the next.
-fn stride(source: &Source<'_>, view: Index<json::buffer::View>, size: u64) -> Result<u64, ImportError> {
-    let Some(stride) = source.root.buffer_views[view.value()].byte_stride else { return Ok(size) };
+fn stride(source: &Source<'_>, view: Index<json::buffer::View>, pitch: u64) -> Result<u64, ImportError> {
+    let Some(stride) = source.root.buffer_views[view.value()].byte_stride else { return Ok(pitch) };
     let stride = stride.0 as u64;
-    if stride < size || stride > json::buffer::MAX_BYTE_STRIDE as u64 {
+    if stride < pitch || stride > json::buffer::MAX_BYTE_STRIDE as u64 {
         let place = format!("/bufferViews/{}/byteStride", view.value());
-        let cause = format!("{stride} is not in {size}..=252, where {size} is the size of an element");
+        let cause = format!("{stride} is not in {pitch}..=252, where {pitch} is the size of an element");
         return Err(source.invalid(place, cause));
     }
     Ok(stride)
 }
 
-/// The elements of a buffer view, checked to lie inside it.
-fn strided<'a>(
-    source: &'a Source<'_>,
-    place: &str,
-    view: Index<json::buffer::View>,
-    offset: u64,
-    stride: u64,
-    count: u64,
-    size: u64,
-) -> Result<Strided<'a>, ImportError> {
-    let bytes = source.view(view)?;
-    let available = bytes.len() as u64;
-    // `count` is below the limit on elements and `stride` below 256, but the limit is the user's.
-    let needed = match count.checked_sub(1) {
-        None => Some(0),
-        Some(steps) => steps.checked_mul(stride).and_then(|n| n.checked_add(size)),
-    };
-    let end = needed.and_then(|n| n.checked_add(offset));
-    if end.is_none_or(|end| end > available) {
-        let cause = format!(
-            "{count} elements of {size} bytes, {stride} apart, from byte {offset} leave buffer view {}, which has {available}",
-            view.value()
-        );
-        return Err(source.invalid(place, cause));
-    }
-    // An empty accessor may have its offset at the very end.
-    Ok(Strided { bytes: &bytes[offset as usize..], stride: stride as usize })
-}
-
-/// Bytes of an element. Columns of matrices begin at multiples of four bytes.
-fn element_size(kind: Type, component: ComponentType) -> u64 {
-    let size = component.size();
+/// Bytes of an element, without and with what fills it up: columns of matrices begin at multiples of four bytes.
+fn element_size(kind: Type, component: ComponentType) -> (u64, u64) {
     let (rows, columns) = match kind {
         Type::Scalar => (1, 1),
         Type::Vec2 => (2, 1),
@@ -230,8 +266,9 @@ fn element_size(kind: Type, component: ComponentType) -> u64 {
         Type::Mat3 => (3, 3),
         Type::Mat4 => (4, 4),
     };
-    let column = rows * size;
-    (if columns == 1 { column } else { columns * column.next_multiple_of(4) }) as u64
+    let column = rows * component.size() as u64;
+    let pitch = if columns == 1 { column } else { column.next_multiple_of(4) };
+    ((columns - 1) * pitch + column, columns * pitch)
 }
 
 #[cfg(test)]
@@ -299,7 +336,7 @@ mod tests {
             assert!(one(&a, None, &[0; 16]).is_err(), "{count} {offset}");
         }
         let zeros = r#""accessors": [{"type": "VEC2", "componentType": 5126, "count": 1000000000}]"#;
-        assert!(with(zeros, &[], |_| ()).unwrap_err().contains("without data"));
+        assert!(with(zeros, &[], |_| ()).unwrap_err().contains("more than the limit of 16777216"));
     }
 
     #[test]

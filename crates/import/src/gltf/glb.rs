@@ -27,9 +27,8 @@ pub(super) fn split(bytes: &[u8]) -> Result<Glb<'_>, String> {
     if length > bytes.len() {
         return Err(format!("the header says {length} bytes, but the file has {}", bytes.len()));
     }
-    if length < bytes.len() {
-        return Err(format!("the header says {length} bytes, but the file goes on to {}", bytes.len()));
-    }
+    // What comes after the end is no part of it.
+    let bytes = &bytes[..length];
     let mut glb = Glb { json: &[], bin: None };
     let (mut at, mut number) = (12, 0);
     while at < length {

@@ -10,26 +10,59 @@ use serde_path_to_error::Segment;
 
 use crate::ImportError;
 
+/// A file's JSON.
+pub(super) struct Document {
+    /// The typed model, without animations: nothing here plays them, so that nothing in them can be wrong.
+    pub(super) root: Root,
+    /// The tree of values, which keeps numbers in f64.
+    pub(super) value: Value,
+    /// How many animations there are.
+    pub(super) animations: u64,
+}
+
 /// Reads the JSON text.
-///
-/// The tree of values is returned beside the typed model: it keeps transforms in f64.
 ///
 /// # Errors
 /// If it is no JSON, no glTF 2, or a value has the wrong type.
-pub(super) fn parse(file: &Path, text: &[u8]) -> Result<(Root, Value), ImportError> {
-    // Some editors put a byte order mark in front, which JSON readers may pass over (RFC 8259).
+pub(super) fn parse(file: &Path, text: &[u8]) -> Result<Document, ImportError> {
+    // Some editors put a byte order mark in front, which JSON readers may pass over (RFC 8259). Some exporters fill
+    // the chunk of a GLB up with zeros.
     let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
+    let end = text.iter().rposition(|&b| b != 0).map_or(0, |last| last + 1);
     let mut value: Value =
-        serde_json::from_slice(text).map_err(|e| ImportError::invalid(file, "", format!("not JSON: {e}")))?;
+        serde_json::from_slice(&text[..end]).map_err(|e| ImportError::invalid(file, "", format!("not JSON: {e}")))?;
     check_version(file, &value)?;
+    let animations = value.get_mut("animations").map_or(Value::Null, Value::take);
+    let animations = animations.as_array().map_or(0, |a| a.len() as u64);
+    if let Some(object) = value.as_object_mut() {
+        object.remove("animations");
+    }
     // The model wants this list, though the format lets it be left out.
     for scene in value.get_mut("scenes").and_then(Value::as_array_mut).into_iter().flatten() {
         if let Some(scene) = scene.as_object_mut() {
             scene.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));
         }
     }
+    whole_numbers(&mut value);
     let root = typed(file, "", &value)?;
-    Ok((root, value))
+    Ok(Document { root, value, animations })
+}
+
+/// Makes integers of floats that are whole: `1.0` is an integer to the format, but not to the model. The tree is at
+/// most 128 deep, which is the JSON parser's own limit.
+fn whole_numbers(value: &mut Value) {
+    match value {
+        Value::Array(values) => values.iter_mut().for_each(whole_numbers),
+        Value::Object(values) => values.values_mut().for_each(whole_numbers),
+        Value::Number(number) if number.is_f64() => {
+            let x = number.as_f64().unwrap_or(0.5);
+            // To 2^53, f64 holds every integer.
+            if x.fract() == 0.0 && (0.0..=9_007_199_254_740_992.0).contains(&x) {
+                *number = (x as u64).into();
+            }
+        }
+        _ => {}
+    }
 }
 
 /// Reads a value as a type; an error tells where in the value it is.
@@ -125,6 +158,10 @@ pub(super) fn check_references(file: &Path, root: &Root) -> Result<(), ImportErr
         if t.source.value() != u32::MAX as usize {
             check.one(Some(t.source), root.images.len(), format_args!("/textures/{i}/source"))?;
         }
+        if let Some(webp) = webp_source(t) {
+            let place = format_args!("/textures/{i}/extensions/EXT_texture_webp/source");
+            check.one(Some(Index::<gltf::json::Image>::new(webp)), root.images.len(), place)?;
+        }
     }
     for (i, m) in root.materials.iter().enumerate() {
         let pbr = &m.pbr_metallic_roughness;
@@ -177,6 +214,12 @@ pub(super) fn check_references(file: &Path, root: &Root) -> Result<(), ImportErr
     check.one(root.scene, root.scenes.len(), format_args!("/scene"))
 }
 
+/// The image that EXT_texture_webp offers for a texture; a number that is none leads nowhere.
+pub(super) fn webp_source(texture: &gltf::json::Texture) -> Option<u32> {
+    let source = texture.extensions.as_ref()?.others.get("EXT_texture_webp")?.get("source")?;
+    Some(source.as_u64().and_then(|i| u32::try_from(i).ok()).unwrap_or(u32::MAX))
+}
+
 struct References<'a> {
     file: &'a Path,
 }
@@ -206,7 +249,7 @@ mod tests {
 
     fn error(text: &str) -> String {
         let file = Path::new("a.gltf");
-        parse(file, text.as_bytes()).and_then(|(root, _)| check_references(file, &root)).unwrap_err().to_string()
+        parse(file, text.as_bytes()).and_then(|d| check_references(file, &d.root)).unwrap_err().to_string()
     }
 
     #[test]
@@ -236,6 +279,22 @@ mod tests {
     fn references_that_lead_nowhere_are_placed() {
         let text = r#"{"asset": {"version": "2.0"}, "nodes": [{"mesh": 7}], "meshes": []}"#;
         assert_eq!(error(text), "a.gltf: /nodes/0/mesh: element 7 does not exist: there are 0");
+    }
+
+    #[test]
+    fn whole_floats_are_integers() {
+        let text = r#"{"asset": {"version": "2.0"}, "nodes": [{"mesh": 1.0, "translation": [2.0, 0.5, -0.0]}]}"#;
+        let document = parse(Path::new(""), text.as_bytes()).unwrap();
+        assert_eq!(document.root.nodes[0].mesh.unwrap().value(), 1);
+        assert_eq!(document.root.nodes[0].translation, Some([2.0, 0.5, 0.0]));
+        let text = r#"{"asset": {"version": "2.0"}, "nodes": [{"mesh": 1.5}]}"#;
+        assert!(error(text).starts_with("a.gltf: /nodes/0/mesh: invalid type: floating point"));
+    }
+
+    #[test]
+    fn animations_are_only_counted() {
+        let text = r#"{"asset": {"version": "2.0"}, "animations": [{"channels": "none"}, 7]}"#;
+        assert_eq!(parse(Path::new(""), text.as_bytes()).unwrap().animations, 2);
     }
 
     #[test]

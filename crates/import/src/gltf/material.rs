@@ -172,7 +172,7 @@ impl Reader<'_, '_> {
     }
 
     fn info(&mut self, key: &str, info: Info<'_>, channel: Channel) -> Result<TextureRef, ImportError> {
-        self.textures.reference(info, channel, &format!("{}/{key}", self.place), self.report)
+        self.textures.reference(info, channel, &format!("{}/{key}", self.place))
     }
 
     /// A factor from 0 to 1.

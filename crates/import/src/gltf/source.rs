@@ -94,14 +94,6 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Whether an accessor lies in a buffer without data.
-    pub(super) fn lacks_data(&self, accessor: usize) -> bool {
-        let accessor = &self.root.accessors[accessor];
-        let sparse = accessor.sparse.as_ref().map(|s| [s.indices.buffer_view, s.values.buffer_view]);
-        let mut views = accessor.buffer_view.into_iter().chain(sparse.into_iter().flatten());
-        views.any(|v| self.buffers[self.root.buffer_views[v.value()].buffer.value()].is_none())
-    }
-
     /// An error at a place in the file.
     pub(super) fn at(&self, place: impl Into<String>, kind: ErrorKind) -> ImportError {
         ImportError::new(self.file, place, kind)

@@ -18,10 +18,17 @@ use crate::{ImportError, Report};
 /// Textures as materials call for them; images are numbered in the order of their first use.
 pub(super) struct Textures<'a> {
     source: &'a Source<'a>,
-    /// By the number in the file; `None` stands for a texture without a readable image.
-    numbers: BTreeMap<Option<usize>, usize>,
-    /// The images that are used, by the number in the file.
-    used: Vec<Option<usize>>,
+    numbers: BTreeMap<Shown, usize>,
+    used: Vec<Shown>,
+}
+
+/// What a texture shows, by numbers in the file.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Shown {
+    /// An image.
+    Image(usize),
+    /// Nothing that can be read.
+    Nothing { texture: usize },
 }
 
 /// What the different kinds of texture references of a material have in common.
@@ -55,17 +62,21 @@ impl<'a> Textures<'a> {
         info: Info<'_>,
         channel: Channel,
         place: &str,
-        report: &mut Report,
     ) -> Result<TextureRef, ImportError> {
         let root = self.source.root;
         let Some(texture) = root.textures.get(info.index.value()) else {
             let cause = format!("element {} does not exist: there are {}", info.index.value(), root.textures.len());
             return Err(self.source.invalid(format!("{place}/index"), cause));
         };
-        let image = self.image_of(texture, info.index.value(), report)?;
+        let shown = match (json::webp_source(texture), texture.source.value()) {
+            (Some(webp), _) => Shown::Image(webp as usize),
+            // The JSON model's mark for "no source".
+            (None, source) if source == u32::MAX as usize => Shown::Nothing { texture: info.index.value() },
+            (None, source) => Shown::Image(source),
+        };
         let next = self.used.len();
-        let image = *self.numbers.entry(image).or_insert_with(|| {
-            self.used.push(image);
+        let image = *self.numbers.entry(shown).or_insert_with(|| {
+            self.used.push(shown);
             next
         });
         let transform = match (info.transform, info.others.and_then(|o| o.get("KHR_texture_transform"))) {
@@ -87,35 +98,20 @@ impl<'a> Textures<'a> {
         })
     }
 
-    /// The image that a texture shows: of those that extensions offer the first that can be read, else its source.
-    fn image_of(&self, texture: &Texture, index: usize, report: &mut Report) -> Result<Option<usize>, ImportError> {
-        let others = texture.extensions.as_ref().map(|e| &e.others);
-        if let Some(webp) = others.and_then(|o| o.get("EXT_texture_webp")).and_then(|e| e.get("source")) {
-            let place = format!("/textures/{index}/extensions/EXT_texture_webp/source");
-            let count = self.source.root.images.len();
-            return match webp.as_u64() {
-                Some(i) if i < count as u64 => Ok(Some(i as usize)),
-                _ => Err(self.source.invalid(place, format!("{webp} does not exist: there are {count}"))),
-            };
-        }
-        // The JSON model's mark for "no source".
-        if texture.source.value() == u32::MAX as usize {
-            let place = format!("/textures/{index}");
-            report.warn(self.source.file, place, "has no image that can be read: white is shown instead");
-            return Ok(None);
-        }
-        Ok(Some(texture.source.value()))
-    }
-
     /// Decodes the images that are used, in parallel. One that cannot be read is replaced, with a warning.
     pub(super) fn decode(self, report: &mut Report) -> Vec<ImageDesc> {
         let names: Vec<String> = self.used.iter().map(|&i| self.name(i)).collect();
         let mut encoded = Vec::new();
-        for (k, index) in self.used.iter().enumerate() {
-            match index.map(|i| self.bytes(i)) {
-                Some(Ok(bytes)) => encoded.push((k, bytes)),
-                Some(Err(e)) => report.warn(e.file, e.place, format!("{}: white is shown instead", e.kind)),
-                None => {}
+        for (k, &shown) in self.used.iter().enumerate() {
+            let bytes = match shown {
+                Shown::Image(index) => self.bytes(index),
+                Shown::Nothing { texture } => {
+                    Err(self.source.invalid(format!("/textures/{texture}"), "has no image that can be read"))
+                }
+            };
+            match bytes {
+                Ok(bytes) => encoded.push((k, bytes)),
+                Err(e) => report.warn(e.file, e.place, format!("{}: white is shown instead", e.kind)),
             }
         }
         let sources: Vec<_> = encoded.iter().map(|(k, bytes)| Encoded { name: &names[*k], bytes }).collect();
@@ -124,7 +120,10 @@ impl<'a> Textures<'a> {
             match decoded {
                 Ok(image) => images[k] = image,
                 Err(cause) => {
-                    let place = self.used[k].map_or(String::new(), |i| format!("/images/{i}"));
+                    let place = match self.used[k] {
+                        Shown::Image(index) => format!("/images/{index}"),
+                        Shown::Nothing { texture } => format!("/textures/{texture}"),
+                    };
                     report.warn(self.source.file, place, format!("{}: {cause}: white is shown instead", names[k]));
                 }
             }
@@ -143,8 +142,8 @@ impl<'a> Textures<'a> {
     }
 
     /// The image's name, else its file's, else its number.
-    fn name(&self, index: Option<usize>) -> String {
-        let Some(index) = index else { return "no image".into() };
+    fn name(&self, shown: Shown) -> String {
+        let Shown::Image(index) = shown else { return "no image".into() };
         let image = &self.source.root.images[index];
         let file = image.uri.as_ref().filter(|u| !u.starts_with("data:"));
         image.name.clone().or_else(|| file.cloned()).unwrap_or_else(|| format!("image {index}"))

@@ -1,4 +1,4 @@
-//! Data URIs (RFC 2397) with base64 (RFC 4648).
+//! Data URIs (RFC 2397): base64 (RFC 4648) or percent escapes.
 
 /// What a URI says.
 pub(super) enum Uri<'a> {
@@ -11,14 +11,30 @@ pub(super) enum Uri<'a> {
 /// Takes a URI apart; data are decoded.
 ///
 /// # Errors
-/// If a data URI is no base64.
+/// If the data of a data URI cannot be decoded.
 pub(super) fn parse(uri: &str) -> Result<Uri<'_>, String> {
     let Some(rest) = uri.strip_prefix("data:") else { return Ok(Uri::File(uri)) };
     let (kind, data) = rest.split_once(',').ok_or("a data URI without a comma")?;
-    if !kind.ends_with(";base64") {
-        return Err("a data URI that is not base64".into());
+    let data = if kind.ends_with(";base64") { base64(data.as_bytes())? } else { percent(data.as_bytes())? };
+    Ok(Uri::Data(data))
+}
+
+/// Undoes percent escapes.
+fn percent(text: &[u8]) -> Result<Vec<u8>, String> {
+    let mut bytes = Vec::with_capacity(text.len());
+    let mut rest = text;
+    while let [first, tail @ ..] = rest {
+        rest = tail;
+        if *first != b'%' {
+            bytes.push(*first);
+            continue;
+        }
+        let code = tail.get(..2).and_then(|code| std::str::from_utf8(code).ok());
+        let byte = code.and_then(|code| u8::from_str_radix(code, 16).ok());
+        bytes.push(byte.ok_or("a '%' in a data URI that is not followed by two hexadecimal digits")?);
+        rest = &tail[2..];
     }
-    base64(data.as_bytes()).map(Uri::Data)
+    Ok(bytes)
 }
 
 /// Decodes base64 strictly: no white space, whole quads, padding only at the end. Bits that padding cuts off are not
@@ -83,7 +99,8 @@ mod tests {
     fn data_uris_are_told_from_files() {
         assert!(matches!(parse("a%20b.bin"), Ok(Uri::File("a%20b.bin"))));
         assert!(matches!(parse("data:application/octet-stream;base64,Zm9v"), Ok(Uri::Data(d)) if d == b"foo"));
-        assert!(parse("data:text/plain,foo").is_err());
+        assert!(matches!(parse("data:text/plain,a%20%fF"), Ok(Uri::Data(d)) if d == b"a \xff"));
+        assert!(parse("data:,%").is_err() && parse("data:,%4").is_err() && parse("data:,%é").is_err());
         assert!(parse("data:;base64").is_err());
     }
 }
