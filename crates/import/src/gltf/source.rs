@@ -72,7 +72,9 @@ impl<'a> Source<'a> {
         let buffer = self.root.buffer_views[index.value()].buffer.value();
         // The buffer has at least the bytes that it says.
         self.buffers[buffer].as_ref().map(|bytes| &bytes[range]).ok_or_else(|| {
-            self.invalid(format!("/bufferViews/{}/buffer", index.value()), format!("buffer {buffer} has no data"))
+            let cause =
+                format!("buffer {buffer} has no data: neither a URI nor, as the first of a GLB, a binary chunk");
+            self.invalid(format!("/bufferViews/{}/buffer", index.value()), cause)
         })
     }
 
