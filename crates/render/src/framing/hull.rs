@@ -20,9 +20,9 @@ pub(super) enum Hull {
 /// Full vertical angle of view of pictures from inside, radians (60 degrees).
 const INSIDE_FOV: f64 = TAU / 6.0;
 /// Least share of the rays from the middle that end on something, in a hull.
-const CLOSED: f64 = 0.6;
+const CLOSED: f64 = 0.7;
 /// Least share of those that see a front side. From the middle of a solid, all sides are back sides.
-const FRONT: f64 = 0.5;
+const FRONT: f64 = 0.6;
 /// Least share of the view down that is level floor.
 const FLOOR: f64 = 0.3;
 
@@ -104,6 +104,8 @@ impl Floor {
 fn stand(scene: &Scene, bounds: &Aabb<f64>, floor: &Floor, closed: f64) -> Option<Hull> {
     const GRID: usize = 9;
     const FAN: usize = 32;
+    /// By how many steps of the fan a direction is off the middle of the picture.
+    const WEIGHTS: [f64; 5] = [1.0, 0.6, 0.5, 0.4, 0.3];
     let size = bounds.extent();
     let eye = floor.eye();
     let widest = size.x.max(size.z);
@@ -129,10 +131,11 @@ fn stand(scene: &Scene, bounds: &Aabb<f64>, floor: &Floor, closed: f64) -> Optio
             continue;
         }
         for k in 0..FAN {
-            // What is in the middle of the picture counts most.
-            let depth: f64 = [(0, 1.0), (1, 0.6), (FAN - 1, 0.6), (2, 0.4), (FAN - 2, 0.4), (3, 0.2), (FAN - 3, 0.2)]
+            // What is in the middle of the picture counts most; by the root, since what is near hides much.
+            let depth: f64 = WEIGHTS
                 .into_iter()
-                .map(|(turn, weight)| weight * free[(k + turn) % FAN])
+                .enumerate()
+                .map(|(turn, weight)| weight * (free[(k + turn) % FAN].sqrt() + free[(k + FAN - turn) % FAN].sqrt()))
                 .sum();
             if best.is_none_or(|(d, ..)| depth > d) {
                 best = Some((depth, position, ahead(k), free[k]));

@@ -104,14 +104,30 @@ fn fit(points: &[DVec3], towards_camera: DVec3, aspect: f64) -> Camera {
     let aspect = if aspect > 0.0 && aspect.is_finite() { aspect } else { 1.0 };
     let tan_y = (0.5 * OUTSIDE_FOV).tan() * (1.0 - 2.0 * MARGIN);
     let tan_x = tan_y * aspect;
-    // A camera at `x right + y up - d forward` sees a point if |p.right - x| <= tan_x (p.forward + d), and so for y.
-    // The two most demanding points on either side give d, and the x in the middle between them.
-    let reach = |axis: DVec3, tan: f64| {
-        points.iter().map(|p| *p - origin).map(|p| p.dot(axis) - tan * p.dot(forward)).fold(f64::NEG_INFINITY, f64::max)
+    // A camera at `x right + y up - d forward` sees a point within `tan` of its axis if |p.right - x| <= tan
+    // (p.forward + d), and so for y. The two most demanding points on either side give d, and the x between them.
+    let tightest = |axis: DVec3, tan: f64| {
+        let reach = |axis: DVec3| {
+            let demand = |p: &DVec3| (*p - origin).dot(axis) - tan * (*p - origin).dot(forward);
+            points.iter().map(demand).fold(f64::NEG_INFINITY, f64::max)
+        };
+        let (more, less) = (reach(axis), reach(-axis));
+        ((more + less) / (2.0 * tan), 0.5 * (more - less))
     };
-    let (r, l, t, b) = (reach(right, tan_x), reach(-right, tan_x), reach(up, tan_y), reach(-up, tan_y));
-    let distance = ((r + l) / (2.0 * tan_x)).max((t + b) / (2.0 * tan_y));
-    let position = origin + right * (0.5 * (r - l)) + up * (0.5 * (t - b)) - forward * distance;
+    let distance = tightest(right, tan_x).0.max(tightest(up, tan_y).0);
+    // Along the axis with room to spare, the angle is found that would just do, so that both margins are the same.
+    let centred = |axis: DVec3, mut tan: f64| {
+        const STEPS: u32 = 8;
+        for _ in 0..STEPS {
+            let needed = tightest(axis, tan).0 / distance;
+            if !(needed > 0.0 && needed < 1.0) {
+                break;
+            }
+            tan *= needed;
+        }
+        tightest(axis, tan).1
+    };
+    let position = origin + right * centred(right, tan_x) + up * centred(up, tan_y) - forward * distance;
     let depths = points.iter().map(|p| (*p - position).dot(forward));
     let (near, far) = depths.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), z| (a.min(z), b.max(z)));
     // No points, or only one: there is no distance to keep. One as far as the point is from the origin will do.
@@ -129,3 +145,6 @@ fn look(position: DVec3, focal_point: DVec3, fov: f64) -> Camera {
         .or_else(|_| Camera::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, fov))
         .unwrap_or_else(|_| unreachable!("the second one is fixed"))
 }
+
+#[cfg(test)]
+mod tests;
