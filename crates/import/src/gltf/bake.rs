@@ -40,7 +40,7 @@ pub(super) fn joint_transforms(
             }
             let column = |k: usize| Vec3::new(m[k], m[k + 1], m[k + 2]).as_dvec3();
             let matrix = DMat3::from_cols(column(0), column(4), column(8));
-            *transform = *transform * DAffine3::from_mat3_translation(matrix, column(12));
+            *transform *= DAffine3::from_mat3_translation(matrix, column(12));
         }
     }
     Ok(transforms)

@@ -1,13 +1,12 @@
 //! Primitives of meshes: vertex attributes, indices, topologies, morph targets
 //! (glTF 2.0 specification, section 3.7.2).
 
-use glam::{Affine2, Vec2, Vec3, Vec4};
-use gltf::json::accessor::{ComponentType, Type};
+use glam::{Affine2, Vec3};
 use gltf::json::mesh::{Mode, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{self, Index};
 
-use super::accessor::{Accessor, Format};
+use super::attribute::Attributes;
 use super::bake::Influence;
 use super::source::Source;
 use super::tangent;
@@ -35,11 +34,16 @@ pub(super) struct NormalMapping {
 pub(super) struct MeshReader<'a> {
     source: &'a Source<'a>,
     quantized: bool,
+    /// Vertices read, those of shared arrays each time.
+    read: u64,
     vertices: u64,
     triangles: u64,
     /// Primitives of points and lines, and the place of the first.
     undrawn: (u64, String),
 }
+
+/// How often vertices may be read on average, against small files that make endless work.
+const MOST_SHARING: u64 = 4;
 
 /// Sets of texture coordinates that are kept.
 const MOST_SETS: u32 = 8;
@@ -47,7 +51,7 @@ const MOST_SETS: u32 = 8;
 impl<'a> MeshReader<'a> {
     pub(super) fn new(source: &'a Source<'a>) -> Self {
         let quantized = source.uses("KHR_mesh_quantization");
-        Self { source, quantized, vertices: 0, triangles: 0, undrawn: (0, String::new()) }
+        Self { source, quantized, read: 0, vertices: 0, triangles: 0, undrawn: (0, String::new()) }
     }
 
     /// Reads the primitives of a mesh that make triangles, with its morph targets by `weights` (the mesh's own where
@@ -96,46 +100,38 @@ impl<'a> MeshReader<'a> {
             report.warn(source.file, place, "has no POSITION: nothing to draw");
             return Ok(None);
         };
-        let mut attributes = Attributes { source, place: &place, report, count: None };
-        let positions = attributes.read::<3>(positions, "POSITION", &[Type::Vec3], self.position_formats())?;
+        let mut attributes = Attributes { source, place: &place, report, quantized: self.quantized, count: None };
+        let positions = attributes.positions(positions, "attributes/POSITION")?;
         let count = positions.len();
         attributes.count = Some(count);
-        let unit = self.unit_formats();
+        self.read = self.read.saturating_add(count as u64);
+        if self.read > source.limits.elements.saturating_mul(MOST_SHARING) {
+            let cause = "primitives share arrays so often that reading them would take too long";
+            return Err(source.at(place, ErrorKind::Limit(cause.into())));
+        }
 
-        let mut mesh =
-            TriangleMesh { positions: positions.into_iter().map(Vec3::from).collect(), ..Default::default() };
+        let mut mesh = TriangleMesh { positions, ..TriangleMesh::default() };
         let mut influences: Vec<Vec<Influence>> = Vec::new();
         for (semantic, &index) in &json.attributes {
             let Checked::Valid(semantic) = semantic else { continue };
-            let name = semantic.to_string();
+            let at = format!("attributes/{}", semantic.to_string());
             match semantic {
-                Normals => {
-                    let normals = attributes.read::<3>(index, &name, &[Type::Vec3], unit)?;
-                    mesh.normals = normals.into_iter().map(Vec3::from).collect();
-                }
-                Tangents => {
-                    let tangents = attributes.read::<4>(index, &name, &[Type::Vec4], unit)?;
-                    mesh.tangents = tangents.into_iter().map(Vec4::from).collect();
-                }
-                Colors(0) => mesh.colors = attributes.colors(index, &name)?,
+                Normals => mesh.normals = attributes.normals(index, &at)?,
+                Tangents => mesh.tangents = attributes.tangents(index, &at)?,
+                Colors(0) => mesh.colors = attributes.colors(index, &at)?,
                 TexCoords(set) if *set >= MOST_SETS => {
-                    attributes.warn(format!("{name} is one of more than {MOST_SETS} sets: not read"));
+                    attributes.warn(&at, format!("only {MOST_SETS} sets are read: left out"));
                 }
                 TexCoords(set) => {
-                    let uvs = attributes.read::<2>(index, &name, &[Type::Vec2], self.uv_formats())?;
                     let set = *set as usize;
                     mesh.uvs.resize(mesh.uvs.len().max(set + 1), Vec::new());
-                    mesh.uvs[set] = attributes.clean(uvs, &name).into_iter().map(Vec2::from).collect();
+                    mesh.uvs[set] = attributes.uvs(index, &at)?;
                 }
                 Joints(set) => {
-                    let Some(&other) = json.attributes.get(&Checked::Valid(Weights(*set))) else {
-                        return Err(
-                            source.invalid(format!("{place}/attributes"), format!("{name} without its weights"))
-                        );
+                    let Some(&weights) = json.attributes.get(&Checked::Valid(Weights(*set))) else {
+                        return Err(source.invalid(format!("{place}/{at}"), "has no weights beside it"));
                     };
-                    let joints = attributes.joints(index, &name)?;
-                    let weights = attributes.read::<4>(other, &format!("WEIGHTS_{set}"), &[Type::Vec4], FRACTIONS)?;
-                    influences.push(joints.into_iter().zip(weights).collect());
+                    influences.push(attributes.influences(*set, index, weights)?);
                 }
                 // Further colours and the application's own attributes mean nothing here.
                 Colors(_) | Weights(_) | Positions | Semantic::Extras(_) => {}
@@ -143,25 +139,26 @@ impl<'a> MeshReader<'a> {
         }
         for (j, target) in json.targets.iter().flatten().enumerate() {
             let weight = weights.get(j).copied().unwrap_or(0.0);
-            for (index, name, formats) in [
-                (target.positions, "POSITION", self.position_formats()),
-                (target.normals, "NORMAL", unit),
-                (target.tangents, "TANGENT", unit),
-            ] {
-                let Some(index) = index else { continue };
-                let at = format!("targets/{j}/{name}");
-                let deltas = attributes.read_at::<3>(index, &at, &[Type::Vec3], formats)?;
-                let deltas = deltas.into_iter().map(|d| Vec3::from(d) * weight);
-                match name {
-                    _ if weight == 0.0 => {}
-                    "POSITION" => mesh.positions.iter_mut().zip(deltas).for_each(|(p, d)| *p += d),
-                    "NORMAL" => mesh.normals.iter_mut().zip(deltas).for_each(|(n, d)| *n += d),
-                    _ => mesh.tangents.iter_mut().zip(deltas).for_each(|(t, d)| *t += d.extend(0.0)),
-                }
+            let at = |name| format!("targets/{j}/{name}");
+            // Read also where the weight is zero: a damaged file is told of.
+            let weighted = |d: Vec3| if weight == 0.0 { Vec3::ZERO } else { d * weight };
+            if let Some(index) = target.positions {
+                let deltas = attributes.positions(index, &at("POSITION"))?;
+                mesh.positions.iter_mut().zip(deltas).for_each(|(p, d)| *p += weighted(d));
+            }
+            if let Some(index) = target.normals {
+                let deltas = attributes.normals(index, &at("NORMAL"))?;
+                mesh.normals.iter_mut().zip(deltas).for_each(|(n, d)| *n += weighted(d));
+            }
+            if let Some(index) = target.tangents {
+                let deltas = attributes.normals(index, &at("TANGENT"))?;
+                mesh.tangents.iter_mut().zip(deltas).for_each(|(t, d)| *t += weighted(d).extend(0.0));
             }
         }
-
-        let indices = self.indices(json, &place, count)?;
+        let indices = match json.indices {
+            Some(index) => attributes.indices(index, count)?,
+            None => (0..count as u32).collect(),
+        };
         if matches!(mode, Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
             if self.undrawn.0 == 0 {
                 self.undrawn.1 = place;
@@ -190,31 +187,6 @@ impl<'a> MeshReader<'a> {
         Ok(Some(primitive))
     }
 
-    fn indices(&self, json: &json::mesh::Primitive, place: &str, count: usize) -> Result<Vec<u32>, ImportError> {
-        let Some(index) = json.indices else { return Ok((0..count as u32).collect()) };
-        let accessor = Accessor::new(self.source, index)?;
-        let place = format!("{place}/indices");
-        let component = accessor.format.0;
-        if accessor.kind != Type::Scalar || !INDICES.contains(&accessor.format) {
-            return Err(self.source.invalid(place, format!("expected SCALAR of {}", names(INDICES))));
-        }
-        let indices = accessor.integers::<1>().as_flattened().to_vec();
-        let restart = match component {
-            U8 => 0xff,
-            U16 => 0xffff,
-            _ => u32::MAX,
-        };
-        if let Some(k) = indices.iter().position(|&i| i as usize >= count || i == restart) {
-            let cause = if indices[k] == restart {
-                format!("index {restart} (number {k}) would restart the primitive, which glTF does not allow")
-            } else {
-                format!("index {} (number {k}) is out of range: there are {count} vertices", indices[k])
-            };
-            return Err(self.source.invalid(place, cause));
-        }
-        Ok(indices)
-    }
-
     fn budget(&mut self, mesh: &TriangleMesh, place: &str) -> Result<(), ImportError> {
         self.vertices += mesh.positions.len() as u64;
         self.triangles += mesh.triangles.len() as u64;
@@ -224,136 +196,6 @@ impl<'a> MeshReader<'a> {
             return Err(self.source.at(place, ErrorKind::Limit(cause)));
         }
         Ok(())
-    }
-
-    fn position_formats(&self) -> &'static [Format] {
-        if self.quantized { QUANTIZED } else { &QUANTIZED[..1] }
-    }
-
-    fn unit_formats(&self) -> &'static [Format] {
-        if self.quantized { QUANTIZED_UNIT } else { &QUANTIZED_UNIT[..1] }
-    }
-
-    fn uv_formats(&self) -> &'static [Format] {
-        if self.quantized { QUANTIZED } else { FRACTIONS }
-    }
-}
-
-use ComponentType::{F32, I8, I16, U8, U16, U32};
-
-/// Fractions: floats or normalised unsigned integers.
-const FRACTIONS: &[Format] = &[(F32, false), (U8, true), (U16, true)];
-const INDICES: &[Format] = &[(U8, false), (U16, false), (U32, false)];
-const JOINTS: &[Format] = &[(U8, false), (U16, false)];
-/// Positions and texture coordinates by KHR_mesh_quantization; without it positions are the first alone.
-const QUANTIZED: &[Format] = &[
-    (F32, false),
-    (I8, false),
-    (I8, true),
-    (U8, false),
-    (U8, true),
-    (I16, false),
-    (I16, true),
-    (U16, false),
-    (U16, true),
-];
-/// Normals and tangents by KHR_mesh_quantization; without it the first alone.
-const QUANTIZED_UNIT: &[Format] = &[(F32, false), (I8, true), (I16, true)];
-
-fn names(formats: &[Format]) -> String {
-    let name = |&(component, normalized): &Format| {
-        format!("{}{}", component.as_gl_enum(), if normalized { " normalized" } else { "" })
-    };
-    formats.iter().map(name).collect::<Vec<_>>().join(", ")
-}
-
-/// The attributes of one primitive.
-struct Attributes<'a> {
-    source: &'a Source<'a>,
-    place: &'a str,
-    report: &'a mut Report,
-    /// How many vertices there are, once that is known.
-    count: Option<usize>,
-}
-
-impl<'a> Attributes<'a> {
-    fn read<const N: usize>(
-        &self,
-        index: Index<json::Accessor>,
-        name: &str,
-        kinds: &[Type],
-        formats: &[Format],
-    ) -> Result<Vec<[f32; N]>, ImportError> {
-        self.read_at(index, &format!("attributes/{name}"), kinds, formats)
-    }
-
-    fn read_at<const N: usize>(
-        &self,
-        index: Index<json::Accessor>,
-        at: &str,
-        kinds: &[Type],
-        formats: &[Format],
-    ) -> Result<Vec<[f32; N]>, ImportError> {
-        Ok(self.accessor(index, at, kinds, formats)?.floats())
-    }
-
-    fn accessor(
-        &self,
-        index: Index<json::Accessor>,
-        at: &str,
-        kinds: &[Type],
-        formats: &[Format],
-    ) -> Result<Accessor<'a>, ImportError> {
-        let accessor = Accessor::new(self.source, index)?;
-        let place = || format!("{}/{at}", self.place);
-        if !kinds.contains(&accessor.kind) || !formats.contains(&accessor.format) {
-            let (component, normalized) = accessor.format;
-            let cause = format!(
-                "accessor {} is {:?} of {}; expected {kinds:?} of {}",
-                index.value(),
-                accessor.kind,
-                names(&[(component, normalized)]),
-                names(formats)
-            );
-            return Err(self.source.invalid(place(), cause));
-        }
-        if let Some(count) = self.count.filter(|&c| c != accessor.count) {
-            let cause = format!("accessor {} has {} elements for {count} vertices", index.value(), accessor.count);
-            return Err(self.source.invalid(place(), cause));
-        }
-        Ok(accessor)
-    }
-
-    fn colors(&mut self, index: Index<json::Accessor>, name: &str) -> Result<Vec<Vec4>, ImportError> {
-        let accessor = self.accessor(index, &format!("attributes/{name}"), &[Type::Vec3, Type::Vec4], FRACTIONS)?;
-        let colors = if accessor.kind == Type::Vec3 {
-            accessor.floats().into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect()
-        } else {
-            accessor.floats()
-        };
-        let colors = self.clean(colors, name);
-        Ok(colors.into_iter().map(|c| Vec4::from(c).clamp(Vec4::ZERO, Vec4::ONE)).collect())
-    }
-
-    fn joints(&self, index: Index<json::Accessor>, name: &str) -> Result<Vec<[u32; 4]>, ImportError> {
-        Ok(self.accessor(index, &format!("attributes/{name}"), &[Type::Vec4], JOINTS)?.integers())
-    }
-
-    /// Puts zeros where numbers are not finite, with a warning.
-    fn clean<const N: usize>(&mut self, mut values: Vec<[f32; N]>, name: &str) -> Vec<[f32; N]> {
-        let mut bad = 0_u64;
-        for x in values.as_flattened_mut().iter_mut().filter(|x| !x.is_finite()) {
-            *x = 0.0;
-            bad += 1;
-        }
-        if bad > 0 {
-            self.warn(format!("{name}: {bad} numbers that are not finite are taken as 0"));
-        }
-        values
-    }
-
-    fn warn(&mut self, message: String) {
-        self.report.warn(self.source.file, self.place, message);
     }
 }
 
@@ -459,6 +301,8 @@ pub(super) fn complete(mesh: &mut TriangleMesh, mapping: Option<NormalMapping>) 
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec4;
+
     use super::*;
 
     #[test]

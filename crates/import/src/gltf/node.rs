@@ -122,7 +122,7 @@ fn local(
             return Err(source.invalid(place("matrix"), "is not affine: its last row is not (0, 0, 0, 1)"));
         }
         let column = |k: usize| DVec3::new(m[k], m[k + 1], m[k + 2]);
-        DAffine3 { matrix3: DMat3::from_cols(column(0), column(4), column(8)).into(), translation: column(12) }
+        DAffine3 { matrix3: DMat3::from_cols(column(0), column(4), column(8)), translation: column(12) }
     } else {
         let rotation = DQuat::from_array(numbers(json, "rotation").unwrap_or([0.0, 0.0, 0.0, 1.0]));
         let length = rotation.length();

@@ -32,6 +32,7 @@ impl<'a> Source<'a> {
         limits: &'a Limits,
     ) -> Result<Self, ImportError> {
         let mut source = Self { file, root, folder: Folder::of(file)?, limits, buffers: Vec::new() };
+        let mut total = 0_u64;
         for (i, buffer) in root.buffers.iter().enumerate() {
             let place = format!("/buffers/{i}");
             let bytes = match (&buffer.uri, bin) {
@@ -39,6 +40,11 @@ impl<'a> Source<'a> {
                 (None, Some(bin)) if i == 0 => Some(Cow::Borrowed(bin)),
                 (None, _) => None,
             };
+            total += bytes.as_ref().map_or(0, |b| b.len() as u64);
+            if total > limits.file_bytes {
+                let cause = format!("the buffers have more bytes than the limit of {}", limits.file_bytes);
+                return Err(source.at(place, ErrorKind::Limit(cause)));
+            }
             let (wanted, found) = (buffer.byte_length.0, bytes.as_ref().map(|b| b.len() as u64));
             if found.is_some_and(|found| found < wanted) {
                 let cause = format!("says {wanted} bytes, but its data have {}", found.unwrap_or(0));

@@ -72,9 +72,9 @@ fn assign(mesh: &mut TriangleMesh, tangents: &[Option<Vec4>]) {
     mesh.tangents = vec![Vec4::ZERO; originals];
     // The copies of each vertex, as a list linked through the vertices.
     let mut next: Vec<u32> = vec![u32::MAX; originals];
-    for corner in 0..tangents.len() {
+    for (corner, tangent) in tangents.iter().enumerate() {
         let mut vertex = mesh.triangles[corner / 3][corner % 3] as usize;
-        let tangent = tangents[corner]
+        let tangent = tangent
             .filter(|t| t.is_finite() && t.truncate().length_squared() > 0.5)
             .unwrap_or_else(|| mesh.normals[vertex].any_orthonormal_vector().extend(1.0));
         while mesh.tangents[vertex] != Vec4::ZERO && mesh.tangents[vertex] != tangent {

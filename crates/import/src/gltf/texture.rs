@@ -189,7 +189,10 @@ mod tests {
     fn rotation_turns_as_in_khronos_test_model() {
         // TextureTransformTest: the arrow's tip, on the diagonal of the image, must show at the green marker, which
         // stands at (0.42095, 1.01627) in the coordinates of the quad that is turned by 22.5 degrees.
-        let t = TextureTransform { rotation: TextureTransformRotation(0.392_699_08), ..TextureTransform::default() };
+        let t = TextureTransform {
+            rotation: TextureTransformRotation(std::f32::consts::FRAC_PI_8),
+            ..TextureTransform::default()
+        };
         let at = affine(&t).transform_point2(Vec2::new(0.420_951_8, 1.016_267_5));
         assert!((at.x - at.y).abs() < 1e-5, "{at}");
     }

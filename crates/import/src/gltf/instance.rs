@@ -1,0 +1,178 @@
+//! Which mesh stands where: meshes that nodes share stay shared, what must be moved on the CPU is moved.
+
+use std::collections::BTreeMap;
+
+use glam::{DAffine3, DVec3};
+use gltf::json::Index;
+use rayon::prelude::*;
+
+use super::bake;
+use super::material;
+use super::mesh::{self, MeshReader, NormalMapping, Primitive};
+use super::node::Nodes;
+use super::source::Source;
+use crate::scene::{GeometryDesc, InstanceDesc, MeshDesc, SceneDesc, SurfaceDesc};
+use crate::{ImportError, Report};
+
+/// How a node shows its mesh.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Placement {
+    /// As the mesh is.
+    Shared,
+    /// With morph weights of its own.
+    Morphed,
+    /// Moved by a skin; the node's own transform does not count.
+    Skinned,
+    /// By a transform without an inverse.
+    Baked,
+}
+
+/// Reads all meshes and places those of the shown nodes. The scene has its materials by now.
+///
+/// # Errors
+/// If a mesh or a skin is damaged, also where no node shows it.
+pub(super) fn place(
+    source: &Source<'_>,
+    nodes: &Nodes,
+    scene: &mut SceneDesc,
+    report: &mut Report,
+) -> Result<(), ImportError> {
+    let mut shown_by: BTreeMap<usize, Vec<(usize, Placement)>> = BTreeMap::new();
+    for &node in &nodes.shown {
+        if let Some(mesh) = source.root.nodes[node].mesh {
+            shown_by.entry(mesh.value()).or_default().push((node, placement(source, nodes, node)));
+        }
+    }
+    let mut reader = MeshReader::new(source);
+    // By node, since instances are in the order of nodes, not of meshes.
+    let mut placed: BTreeMap<usize, (usize, DAffine3)> = BTreeMap::new();
+    for (i, json) in source.root.meshes.iter().enumerate() {
+        let index = Index::new(i as u32);
+        let name = json.name.clone().unwrap_or_else(|| format!("mesh {i}"));
+        let shown = shown_by.remove(&i).unwrap_or_default();
+        let mut plain = Some(reader.read(index, None, report)?);
+        let mut shared = None;
+        for &(node, _) in shown.iter().filter(|(_, how)| *how == Placement::Shared) {
+            shared = shared.or_else(|| add_mesh(scene, &name, plain.take()?));
+            placed.extend(shared.map(|mesh| (node, (mesh, nodes.world[node]))));
+        }
+        for &(node, how) in shown.iter().filter(|(_, how)| *how != Placement::Shared) {
+            let weights = source.root.nodes[node].weights.as_deref();
+            let mut primitives = match plain.take_if(|_| weights.is_none()) {
+                Some(primitives) => primitives,
+                // Read once more; its warnings are known by now.
+                None => reader.read(index, weights, &mut Report::default())?,
+            };
+            let transform = match how {
+                Placement::Shared | Placement::Morphed => nodes.world[node],
+                Placement::Skinned => skinned(source, nodes, node, &mut primitives, report)?,
+                Placement::Baked => baked(source, nodes, node, &mut primitives, report),
+            };
+            placed.extend(add_mesh(scene, &name, primitives).map(|mesh| (node, (mesh, transform))));
+        }
+    }
+    reader.finish(report);
+    for &node in &nodes.shown {
+        if let Some(&(mesh, transform)) = placed.get(&node) {
+            let name = source.root.nodes[node].name.clone().unwrap_or_else(|| format!("node {node}"));
+            scene.instances.push(InstanceDesc { name, mesh, transform });
+        }
+    }
+    complete(scene);
+    Ok(())
+}
+
+fn placement(source: &Source<'_>, nodes: &Nodes, node: usize) -> Placement {
+    let json = &source.root.nodes[node];
+    if json.skin.is_some() {
+        Placement::Skinned
+    } else if bake::is_singular(&nodes.world[node]) {
+        Placement::Baked
+    } else if json.weights.is_some() {
+        Placement::Morphed
+    } else {
+        Placement::Shared
+    }
+}
+
+/// Moves a node's mesh by its skin. Where it stands then: the first joint is the origin of its own space.
+fn skinned(
+    source: &Source<'_>,
+    nodes: &Nodes,
+    node: usize,
+    primitives: &mut Vec<Primitive>,
+    report: &mut Report,
+) -> Result<DAffine3, ImportError> {
+    let json = &source.root.nodes[node];
+    let Some(skin) = json.skin else { return Ok(nodes.world[node]) };
+    let joints = bake::joint_transforms(source, skin, &nodes.world)?;
+    let first = source.root.skins[skin.value()].joints.first();
+    let origin = first.map_or(DVec3::ZERO, |j| nodes.world[j.value()].translation);
+    for p in primitives.iter_mut() {
+        let mut transforms = Vec::with_capacity(p.mesh.positions.len());
+        for v in 0..p.mesh.positions.len() {
+            let influences: Vec<_> = p.influences.iter().map(|set| set[v]).collect();
+            // A primitive without joints hangs at the node.
+            let transform =
+                if influences.is_empty() { Some(nodes.world[node]) } else { bake::blend(&influences, &joints) };
+            transforms.push(transform.ok_or_else(|| {
+                let mesh = json.mesh.map_or(0, |m| m.value());
+                let place = format!("/meshes/{mesh}/primitives/{}/attributes", p.number);
+                let cause =
+                    format!("a vertex hangs at joints {influences:?}, but skin {} has {}", skin.value(), joints.len());
+                source.invalid(place, cause)
+            })?);
+        }
+        if !bake::deform(&mut p.mesh, |v| transforms[v], origin) {
+            report.warn(source.file, format!("/nodes/{node}/skin"), "moves vertices out of all range: left out");
+            p.mesh.triangles.clear();
+        }
+    }
+    primitives.retain(|p| !p.mesh.triangles.is_empty());
+    Ok(DAffine3::from_translation(origin))
+}
+
+/// Moves a mesh by its node's transform; drops it, with a warning, where no surface is left.
+fn baked(
+    source: &Source<'_>,
+    nodes: &Nodes,
+    node: usize,
+    primitives: &mut Vec<Primitive>,
+    report: &mut Report,
+) -> DAffine3 {
+    let world = nodes.world[node];
+    let origin = if world.translation.is_finite() { world.translation } else { DVec3::ZERO };
+    let before = primitives.len();
+    primitives.retain_mut(|p| bake::deform(&mut p.mesh, |_| world, origin) && !bake::is_degenerate(&p.mesh));
+    if primitives.len() < before {
+        let message = "its transform leaves no surface of its mesh: not drawn";
+        report.warn(source.file, format!("/nodes/{node}"), message);
+    }
+    DAffine3::from_translation(origin)
+}
+
+/// Adds a mesh to the scene; `None` if there is nothing in it.
+fn add_mesh(scene: &mut SceneDesc, name: &str, primitives: Vec<Primitive>) -> Option<usize> {
+    if primitives.is_empty() {
+        return None;
+    }
+    let geometry = |p: Primitive| GeometryDesc {
+        name: format!("primitive {}", p.number),
+        surface: SurfaceDesc::Triangles(p.mesh),
+        material: p.material,
+    };
+    let geometries = primitives.into_iter().map(geometry).collect();
+    scene.meshes.push(MeshDesc { name: name.to_owned(), geometries });
+    Some(scene.meshes.len() - 1)
+}
+
+/// Adds the tangents that normal textures need and the file does not give.
+fn complete(scene: &mut SceneDesc) {
+    let mappings: Vec<Option<NormalMapping>> = scene.materials.iter().map(material::normal_mapping).collect();
+    let geometries = scene.meshes.par_iter_mut().flat_map(|m| m.geometries.par_iter_mut());
+    geometries.for_each(|geometry| {
+        if let (SurfaceDesc::Triangles(mesh), Some(material)) = (&mut geometry.surface, geometry.material) {
+            mesh::complete(mesh, mappings[material]);
+        }
+    });
+}
