@@ -2,6 +2,8 @@
 
 pub mod corpus;
 
+pub mod oracle;
+
 use std::path::{Path, PathBuf};
 
 /// The folder of public models and references, which a clone does not hold.

@@ -46,7 +46,7 @@ pub(crate) struct PrimitiveId {
 /// Where a geometry's primitives are.
 #[derive(Clone, Debug)]
 enum Places {
-    /// Position in the leaves' order of each triangle.
+    /// Position in the leaves' order of each triangle; none (`u32::MAX`) for those without area.
     Triangles(Vec<u32>),
     /// Index into the shapes.
     Shape(u32),
@@ -99,7 +99,9 @@ impl Model {
                     for (k, t) in indices.iter().enumerate() {
                         let vertices = t.map(|i| normalised(positions[i as usize]));
                         if triangle::area_vector(vertices.map(|v| v.as_dvec3())) == DVec3::ZERO {
+                            // Never hit, so in no tree.
                             model.degenerate += 1;
+                            continue;
                         }
                         triangles.push(vertices);
                         boxes.push(Aabb::from_points(vertices));

@@ -3,35 +3,23 @@
 use firsthit_geometry::Aabb;
 use obvhs::bvh2::Bvh2;
 
-use super::{Child, MAX_DEPTH, Topology, balanced, cluster::Clusters};
+use super::{Child, MAX_DEPTH, Topology, balanced};
 
-/// A copy of obvhs's tree, with its groups opened.
-pub(super) fn copy(bvh: &Bvh2, clusters: &Clusters, boxes: &[Aabb<f32>]) -> Topology {
-    let mut tree = Topology { order: Vec::with_capacity(boxes.len()), ..Topology::default() };
+/// A copy of obvhs's tree.
+pub(super) fn copy(bvh: &Bvh2) -> Topology {
+    let mut tree = Topology { order: Vec::with_capacity(bvh.primitive_indices.len()), ..Topology::default() };
     if bvh.nodes.is_empty() {
         return tree;
     }
-    let mut items = Vec::new();
     // Nodes to copy, and where their parent's copy wants to know the place. Depth first: the right child waits.
     let mut todo = vec![(0usize, None::<(usize, usize)>)];
     while let Some((at, parent)) = todo.pop() {
         let node = &bvh.nodes[at];
         let child = if node.is_leaf() {
-            items.clear();
             let run = node.first_index as usize..(node.first_index + node.prim_count) as usize;
-            for &item in &bvh.primitive_indices[run] {
-                match clusters.loose.get(item as usize) {
-                    Some(&i) => items.push(i),
-                    None => items.extend_from_slice(&clusters.groups[item as usize - clusters.loose.len()]),
-                }
-            }
-            if items.len() <= node.prim_count as usize {
-                let first = tree.order.len() as u32;
-                tree.order.extend_from_slice(&items);
-                Child { first, count: items.len() as u32 }
-            } else {
-                balanced::append(&mut tree, &mut items, boxes)
-            }
+            let first = tree.order.len() as u32;
+            tree.order.extend_from_slice(&bvh.primitive_indices[run]);
+            Child { first, count: node.prim_count }
         } else {
             let index = tree.nodes.len();
             tree.nodes.push([Child::default(); 2]);

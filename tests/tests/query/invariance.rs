@@ -1,0 +1,166 @@
+//! Answers depend on the scene alone: not on order, tree, scale by powers of two, or place.
+
+use firsthit_accel::{BuildOptions, BuildQuality, Hit, Scene, SceneBuilder, VisitOrder};
+use firsthit_geometry::{Precision, Ray};
+use firsthit_tests::oracle::{Aim, Mesh, Rng, grid_cube, icosphere, read_obj};
+use glam::{DAffine3, DVec3, Vec3};
+
+use crate::{scene_of, triangles};
+
+/// Rays at vertices, edges and faces, from around and inside.
+fn aimed(mesh: &Mesh, count: usize) -> Vec<Ray<f64>> {
+    let mut rng = Rng(21);
+    let size = mesh.positions.iter().fold(0.0f32, |m, p| m.max(p.abs().max_element()));
+    (0..count)
+        .map(|k| {
+            let target = Aim::ALL[k % 3].point(mesh.corners(rng.below(mesh.triangles.len())), &mut rng);
+            let origin = rng.in_cube() * f64::from(size) * if k % 2 == 0 { 0.5 } else { 30.0 };
+            Ray::new(origin, target - origin)
+        })
+        .collect()
+}
+
+fn bits(h: &Option<Hit>) -> Option<([u32; 3], u64, u32, u32)> {
+    h.map(|h| ([h.id.instance, h.id.geometry, h.id.primitive], h.t.to_bits(), h.u.to_bits(), h.v.to_bits()))
+}
+
+fn same_in_any_order(scene: &Scene, rays: &[Ray<f64>], name: &str) {
+    for ray in rays {
+        let near = scene.closest_hit_in_order(ray, VisitOrder::NearFirst);
+        for order in [VisitOrder::FarFirst, VisitOrder::Exhaustive] {
+            let other = scene.closest_hit_in_order(ray, order);
+            assert_eq!(bits(&near), bits(&other), "{name}: {order:?} {ray:?}");
+        }
+    }
+}
+
+#[test]
+fn order_of_visits_and_boxes_change_nothing() {
+    for precision in Precision::ALL {
+        for (name, mesh) in [("icosphere", icosphere(4)), ("grid", grid_cube(12))] {
+            let scene = scene_of(&mesh, DAffine3::IDENTITY, precision);
+            same_in_any_order(&scene, &aimed(&mesh, 3000), name);
+        }
+    }
+}
+
+#[test]
+fn order_of_visits_and_boxes_change_nothing_on_scans() {
+    let Some(shared) = firsthit_tests::shared() else { return };
+    for (name, count) in
+        [("spot/spot.obj", 3000), ("stanford-bunny/stanford-bunny.obj", 300), ("sibenik/sibenik.obj", 300)]
+    {
+        let mesh = read_obj(&shared.join("assets").join(name)).expect(name);
+        for precision in Precision::ALL {
+            same_in_any_order(&scene_of(&mesh, DAffine3::IDENTITY, precision), &aimed(&mesh, count), name);
+        }
+    }
+}
+
+#[test]
+fn overlapping_instances_in_any_order() {
+    // The same sphere many times at the same place and nearly so: ties between instances.
+    let mesh = icosphere(2);
+    for precision in Precision::ALL {
+        let mut builder = SceneBuilder::new(BuildOptions { precision, ..BuildOptions::default() });
+        let m = builder.add_mesh(vec![triangles(&mesh)]);
+        for k in 0..30 {
+            builder.add_instance(m, DAffine3::from_translation(DVec3::X * f64::from(k / 3) * 0.1));
+        }
+        let scene = builder.build().expect("a good scene");
+        let rays = aimed(&mesh, 2000);
+        same_in_any_order(&scene, &rays, "instances");
+        for ray in &rays {
+            // Of three equal instances the first is reported.
+            assert!(scene.closest_hit(ray).is_none_or(|h| h.id.instance % 3 == 0));
+        }
+    }
+}
+
+#[test]
+fn trees_of_any_quality_answer_alike() {
+    let mesh = icosphere(4);
+    let rays = aimed(&mesh, 10_000);
+    for precision in Precision::ALL {
+        let answers = [BuildQuality::Fast, BuildQuality::Balanced, BuildQuality::High].map(|quality| {
+            let mut builder = SceneBuilder::new(BuildOptions { precision, quality, ..BuildOptions::default() });
+            let m = builder.add_mesh(vec![triangles(&mesh)]);
+            builder.add_instance(m, DAffine3::from_rotation_y(0.3));
+            let scene = builder.build().expect("a good mesh");
+            rays.iter().map(|r| bits(&scene.closest_hit(r))).collect::<Vec<_>>()
+        });
+        assert!(answers[0] == answers[1] && answers[1] == answers[2], "{precision}");
+    }
+}
+
+/// S3: scaling by a power of two scales t alone, or nothing if the direction is scaled too.
+#[test]
+fn powers_of_two_change_no_bit() {
+    let mesh = icosphere(3);
+    let rays = aimed(&mesh, 2000);
+    for precision in Precision::ALL {
+        let plain = scene_of(&mesh, DAffine3::IDENTITY, precision);
+        for exponent in [-60, -20, -1, 1, 20, 60] {
+            let s = 2f64.powi(exponent);
+            let baked = scene_of(&mesh.clone().map(|p| p * s as f32), DAffine3::IDENTITY, precision);
+            let placed = scene_of(&mesh, DAffine3::from_scale(DVec3::splat(s)), precision);
+            for ray in &rays {
+                let expected = plain.closest_hit(ray);
+                let both = Ray::new(ray.origin * s, ray.direction * s);
+                let kept = Ray::new(ray.origin * s, ray.direction);
+                let stretched = expected.map(|h| Hit { t: h.t * s, ..h });
+                for scene in [&baked, &placed] {
+                    assert_eq!(bits(&scene.closest_hit(&both)), bits(&expected), "{precision} 2^{exponent}");
+                    assert_eq!(bits(&scene.closest_hit(&kept)), bits(&stretched), "{precision} 2^{exponent}");
+                }
+            }
+        }
+    }
+}
+
+/// A model far away answers as at the origin: what is rounded is the world's f64, nothing else.
+#[test]
+fn ten_million_units_away() {
+    let mesh = icosphere(4);
+    let offset = DVec3::new(1e7, -1e7, 1e7);
+    for precision in [Precision::Robust, Precision::Double] {
+        let here = scene_of(&mesh, DAffine3::IDENTITY, precision);
+        let there = scene_of(&mesh, DAffine3::from_translation(offset), precision);
+        let mut rng = Rng(31);
+        let mut hits = 0;
+        for _ in 0..20_000 {
+            // An origin that the offset does not round.
+            let origin = (rng.in_cube() * 3.0 * 65536.0).round() / 65536.0;
+            let direction = rng.direction();
+            let a = here.closest_hit(&Ray::new(origin, direction));
+            let b = there.closest_hit(&Ray::new(origin + offset, direction));
+            assert_eq!(bits(&a), bits(&b));
+            hits += usize::from(a.is_some());
+        }
+        assert!(hits > 1000);
+    }
+}
+
+/// Rays from far away lose no digit in the object: an eye a million sizes off sees what one nearby sees.
+#[test]
+fn an_origin_far_outside() {
+    let mesh = Mesh {
+        positions: vec![Vec3::new(-1.0, -1.0, 0.0), Vec3::new(1.0, -1.0, 0.0), Vec3::new(0.0, 1.0, 0.0)],
+        triangles: vec![[0, 1, 2]],
+    };
+    for precision in [Precision::Robust, Precision::Double] {
+        let scene = scene_of(&mesh, DAffine3::IDENTITY, precision);
+        let mut rng = Rng(41);
+        for _ in 0..2000 {
+            let target = DVec3::new(rng.signed() * 0.2, rng.signed() * 0.2, 0.0);
+            let direction = DVec3::new(rng.signed() * 0.5, rng.signed() * 0.5, -1.0);
+            let origin = target - direction * 1e6;
+            let hit = scene.closest_hit(&Ray::new(origin, direction)).expect("aimed inside");
+            assert!((hit.t - 1e6).abs() < 1e-8, "{precision} {}", hit.t);
+            // u + v / 2 ... by where it was aimed: v is the height over the base, u follows.
+            let v = (target.y + 1.0) / 2.0;
+            let u = (target.x + 1.0 - v) / 2.0;
+            assert!((f64::from(hit.u) - u).abs() < 2e-6 && (f64::from(hit.v) - v).abs() < 2e-6, "{precision}");
+        }
+    }
+}

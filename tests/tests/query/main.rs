@@ -1,0 +1,29 @@
+//! Queries of built scenes: no leaks, the same answers as slow twins, whatever the tree, order, scale or place.
+
+mod degenerate;
+mod invariance;
+mod leaks;
+mod rays;
+mod spawn;
+mod twins;
+
+use firsthit_accel::{BuildOptions, Geometry, Scene, SceneBuilder};
+use firsthit_geometry::Precision;
+use firsthit_tests::oracle::Mesh;
+use glam::DAffine3;
+
+fn options(precision: Precision) -> BuildOptions {
+    BuildOptions { precision, ..BuildOptions::default() }
+}
+
+fn triangles(mesh: &Mesh) -> Geometry {
+    Geometry::Triangles { positions: mesh.positions.clone(), triangles: mesh.triangles.clone() }
+}
+
+/// One mesh, placed once.
+fn scene_of(mesh: &Mesh, transform: DAffine3, precision: Precision) -> Scene {
+    let mut builder = SceneBuilder::new(options(precision));
+    let m = builder.add_mesh(vec![triangles(mesh)]);
+    builder.add_instance(m, transform);
+    builder.build().expect("a good mesh")
+}
