@@ -213,7 +213,7 @@ pub(crate) struct SceneArgs {
     #[arg(long, value_name = "DEG", default_value = "0", value_parser = values::number, allow_hyphen_values = true)]
     pub(crate) hdri_rotation: f64,
 
-    /// One colour behind the model: sRGB from 0 to 1, or #rrggbb
+    /// One colour behind the model: sRGB from 0 to 1, or #rrggbb; a PNG shows exactly it
     #[arg(long, value_name = "R,G,B", value_parser = values::color, overrides_with = "no_background")]
     pub(crate) background_color: Option<Color>,
 

@@ -9,7 +9,7 @@ use firsthit_accel::{BuildOptions, SceneBuilder};
 use firsthit_import::Imported;
 use firsthit_import::scene::Settings;
 use firsthit_render::{
-    Background, CameraChanges, Clip, RenderOptions, Rendered, Stage, StageOptions, View,
+    Background, CameraChanges, Clip, RenderOptions, Rendered, Stage, StageOptions, View, ViewTransform,
     output::{BitDepth, WriteOptions, write_film, write_png},
 };
 
@@ -66,7 +66,7 @@ impl Job<'_> {
         let Imported { scene, report } = firsthit_import::open(&args.model, &options)?;
         self.console.warnings(&report, args.run.strict)?;
         let options = render_options(args, &scene.settings)?;
-        let stage_options = stage_options(args, &options)?;
+        let stage_options = stage_options(args, &options, &self.target)?;
         seconds.load = started.elapsed().as_secs_f64();
 
         let started = Instant::now();
@@ -136,10 +136,17 @@ impl Job<'_> {
     /// Writes the image and what belongs to it; the answer: the files, the image first.
     fn write(&self, rendered: &Rendered) -> Result<Vec<PathBuf>, Failure> {
         let output = &self.args.output;
-        let view = View { transform: output.tone_mapping, exposure: output.exposure as f32 };
+        let view = View {
+            transform: output.tone_mapping,
+            exposure: output.exposure as f32,
+            backdrop: self.args.scene.background_color.map(|color| match output.tone_mapping {
+                ViewTransform::None => color.linear(),
+                _ => color.0,
+            }),
+        };
         let bit_depth = if output.bit_depth == 16 { BitDepth::Sixteen } else { BitDepth::Eight };
         match &self.target {
-            Target::File(path) => {
+            Target::File(path, _) => {
                 write_film(path, &rendered.film, &WriteOptions { view, bit_depth }).map_err(Failure::failed)
             }
             Target::Stdout => {
@@ -202,15 +209,17 @@ fn render_options(args: &RenderArgs, settings: &Settings) -> Result<RenderOption
 }
 
 /// What the scene is set up with.
-fn stage_options(args: &RenderArgs, render: &RenderOptions) -> Result<StageOptions, Failure> {
+fn stage_options(args: &RenderArgs, render: &RenderOptions, target: &Target) -> Result<StageOptions, Failure> {
     let scene = &args.scene;
     Ok(StageOptions {
         environment: hdri::environment(scene.hdri.as_ref())?,
         environment_rotation: scene.hdri_rotation.to_radians() as f32,
-        background: match (scene.background_color, scene.no_background) {
-            (_, true) => Background::Transparent,
-            (Some(color), false) => Background::Color(color.0),
-            (None, false) => Background::Auto,
+        background: match scene.background_color {
+            // A PNG gets the colour as it was asked for: it is put behind the image after tone mapping.
+            Some(_) if target.is_png() => Background::Transparent,
+            Some(color) => Background::Color(color.linear()),
+            None if scene.no_background => Background::Transparent,
+            None => Background::Auto,
         },
         effects: args.quality.effects,
         camera: args.camera.camera.clone(),

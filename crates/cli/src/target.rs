@@ -12,7 +12,7 @@ pub(crate) enum Target {
     /// PNG on standard output.
     Stdout,
     /// A file of the format that its name says.
-    File(PathBuf),
+    File(PathBuf, Format),
 }
 
 impl Target {
@@ -22,7 +22,7 @@ impl Target {
             return Ok(Self::Stdout);
         }
         let path = output.map_or_else(|| default_name(model), Path::to_owned);
-        Format::from_path(&path).map_err(Failure::usage)?;
+        let format = Format::from_path(&path).map_err(Failure::usage)?;
         if path.is_dir() {
             return Err(Failure::failed(format_args!("{}: this is a folder, not a file", path.display())));
         }
@@ -31,14 +31,19 @@ impl Target {
             let failure = Failure::failed(format_args!("{}: there is no folder {}", path.display(), folder.display()));
             return Err(failure.hint(format_args!("mkdir -p {}", folder.display())));
         }
-        Ok(Self::File(path))
+        Ok(Self::File(path, format))
+    }
+
+    /// Whether it shows what a display shows, instead of radiance.
+    pub(crate) fn is_png(&self) -> bool {
+        matches!(self, Self::Stdout | Self::File(_, Format::Png))
     }
 
     /// As it is named in messages and reports.
     pub(crate) fn name(&self) -> String {
         match self {
             Self::Stdout => "-".into(),
-            Self::File(path) => path.display().to_string(),
+            Self::File(path, _) => path.display().to_string(),
         }
     }
 }

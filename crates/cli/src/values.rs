@@ -33,9 +33,15 @@ pub(crate) struct Plane {
     pub(crate) offset: f64,
 }
 
-/// A linear colour.
+/// A colour as a display shows it: sRGB, from 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Color(pub(crate) Vec3);
+
+impl Color {
+    pub(crate) fn linear(self) -> Vec3 {
+        self.0.map(|c| srgb_to_linear(c.into()) as f32)
+    }
+}
 
 /// Pictures beside the colour, each once.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -115,7 +121,7 @@ pub(crate) fn color(s: &str) -> Result<Color, String> {
         None => numbers(s),
     };
     rgb.filter(|rgb| rgb.iter().all(|c| (0.0..=1.0).contains(c)))
-        .map(|rgb| Color(Vec3::from_array(rgb.map(|c| srgb_to_linear(c) as f32))))
+        .map(|rgb| Color(Vec3::from_array(rgb.map(|c| c as f32))))
         .ok_or_else(|| "expected three numbers from 0 to 1, or #rrggbb".into())
 }
 
@@ -270,7 +276,7 @@ mod tests {
     fn colors_are_srgb() {
         assert_eq!(color("0,0.5,1").map(|c| c.0.x), Ok(0.0));
         assert_eq!(color("#ffffff"), Ok(Color(Vec3::ONE)));
-        assert!((color("#808080").unwrap().0.y - 0.215_861).abs() < 1e-6);
+        assert!((color("#808080").unwrap().linear().y - 0.215_861).abs() < 1e-6);
         for s in ["", "1,1", "2,0,0", "-0.1,0,0", "#fff", "#gggggg", "#+12345"] {
             assert!(color(s).is_err(), "{s}");
         }

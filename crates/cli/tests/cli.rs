@@ -96,14 +96,26 @@ impl Run {
 
 /// Width, height and bits per channel from the header of a PNG.
 #[track_caller]
-fn png(bytes: &[u8]) -> (u32, u32, u8) {
+fn header(bytes: &[u8]) -> (u32, u32, u8) {
     assert!(bytes.starts_with(b"\x89PNG\r\n\x1a\n"), "no PNG");
     let number = |at: usize| u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap());
     (number(16), number(20), bytes[24])
 }
 
 fn png_file(path: &Path) -> (u32, u32, u8) {
-    png(&std::fs::read(path).unwrap())
+    header(&std::fs::read(path).unwrap())
+}
+
+struct Pixels {
+    line_size: usize,
+    pixels: Vec<u8>,
+}
+
+fn decode(png: &[u8]) -> Pixels {
+    let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut pixels).unwrap();
+    Pixels { line_size: info.line_size, pixels }
 }
 
 #[test]
@@ -141,7 +153,7 @@ fn quiet_is_quiet() {
 fn standard_output_takes_the_image_alone() {
     let folder = Folder::new();
     let run = folder.render(&["-o", "-", "--bit-depth=16", "--explain", "--progress"]).code(0);
-    assert_eq!(png(&run.0.stdout), (32, 18, 16));
+    assert_eq!(header(&run.0.stdout), (32, 18, 16));
     assert_eq!(folder.files(), ["cube.mtl", "cube.obj"]);
 }
 
@@ -333,6 +345,23 @@ fn pictures_beside_the_colour_are_written_and_reported() {
     }
     let report = folder.render(&["--aov", "depth,normal", "--json", "-o", "all.exr"]).code(0).json();
     assert_eq!(report["aov_files"], Value::Array(Vec::new()));
+}
+
+#[test]
+fn a_background_colour_is_shown_exactly() {
+    let folder = Folder::new();
+    let rgb = |bytes: &[u8]| {
+        let image = decode(bytes);
+        assert_eq!(image.line_size, 3 * 32, "opaque");
+        [image.pixels[0], image.pixels[1], image.pixels[2]]
+    };
+    for tone_mapping in ["pbr-neutral", "agx", "srgb"] {
+        let run = folder.render(&["--background-color", "#ff8040", "--tone-mapping", tone_mapping, "-o", "-"]);
+        assert_eq!(rgb(&run.code(0).0.stdout), [0xff, 0x80, 0x40], "{tone_mapping}");
+    }
+    let transparent = folder.render(&["--no-background", "-o", "-"]).code(0);
+    let image = decode(&transparent.0.stdout);
+    assert_eq!((image.line_size, image.pixels[3]), (4 * 32, 0));
 }
 
 #[test]

@@ -55,7 +55,7 @@ impl std::str::FromStr for ViewTransform {
 /// ```
 /// use firsthit_render::{View, ViewTransform};
 /// use glam::Vec3;
-/// let view = View { transform: ViewTransform::Srgb, exposure: 1.0 };
+/// let view = View { transform: ViewTransform::Srgb, exposure: 1.0, ..View::default() };
 /// assert_eq!(view.apply(Vec3::splat(0.5)), Vec3::ONE);
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -64,6 +64,9 @@ pub struct View {
     pub transform: ViewTransform,
     /// Stops: radiance is multiplied by 2 to this before anything else.
     pub exposure: f32,
+    /// The display's values in [0, 1] of what lies behind a transparent picture. It is no part of the scene: neither
+    /// exposure nor transform change it. `None`: transparent stays transparent.
+    pub backdrop: Option<Vec3>,
 }
 
 impl View {
@@ -154,7 +157,7 @@ mod tests {
     use super::*;
 
     fn view(transform: ViewTransform, exposure: f32) -> View {
-        View { transform, exposure }
+        View { transform, exposure, backdrop: None }
     }
 
     #[test]

@@ -58,8 +58,9 @@ impl fmt::Display for Inspection<'_> {
         let called = self.effects.iter().filter(|e| e.called_for);
         row(f, "effects", grouped(called.clone().count() as u64))?;
         list(f, &called.collect::<Vec<_>>(), |e| (e.name, e.by_in_words()))?;
+        row(f, "by default", "as `render` without options".into())?;
         for choice in self.choices {
-            row(f, "", choice.clone())?;
+            writeln!(f, "    {choice}")?;
         }
         row(f, "warnings", grouped(self.warnings.len() as u64 + self.more_warnings))?;
         for warning in self.warnings.iter().take(SHOWN) {

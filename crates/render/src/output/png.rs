@@ -16,7 +16,7 @@ use crate::{View, ViewTransform};
 /// # Errors
 /// When `out` fails or the picture has no pixels.
 pub fn write_png(out: &mut impl Write, picture: &Picture, view: &View, depth: BitDepth) -> io::Result<()> {
-    let opaque = picture.pixels.iter().all(|p| p[3] >= 1.0);
+    let opaque = view.backdrop.is_some() || picture.pixels.iter().all(|p| p[3] >= 1.0);
     let values = picture.pixels.iter().map(|p| shown(Vec4::from(*p), view));
     let channels = if opaque { 3 } else { 4 };
 
@@ -46,5 +46,10 @@ pub fn write_png(out: &mut impl Write, picture: &Picture, view: &View, depth: Bi
 fn shown(pixel: Vec4, view: &View) -> [f32; 4] {
     let alpha = pixel.w.clamp(0.0, 1.0);
     let color = if pixel.w > 0.0 { pixel.truncate() / pixel.w } else { Vec3::ZERO };
-    view.apply(color).extend(if alpha.is_nan() { 0.0 } else { alpha }).to_array()
+    let (color, alpha) = (view.apply(color), if alpha.is_nan() { 0.0 } else { alpha });
+    match view.backdrop {
+        Some(behind) => behind.lerp(color, alpha).extend(1.0),
+        None => color.extend(alpha),
+    }
+    .to_array()
 }

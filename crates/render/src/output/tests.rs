@@ -22,7 +22,7 @@ fn film(crop: Option<Crop>, alpha: bool) -> Film {
 }
 
 fn view(transform: ViewTransform) -> View {
-    View { transform, exposure: 0.0 }
+    View { transform, exposure: 0.0, backdrop: None }
 }
 
 fn png(film: &Film, view: &View, depth: BitDepth) -> Vec<u8> {
