@@ -144,6 +144,18 @@ fn every_shipped_scene_and_model_opens_without_a_warning() {
     assert!(opened >= 10, "{opened}");
 }
 
+#[test]
+fn the_example_of_the_manual_is_a_scene() {
+    let manual = fs::read_to_string(workspace().join("docs/scene-files.md")).expect("the manual");
+    let example = manual.split("```toml").nth(1).and_then(|rest| rest.split("```").next()).expect("an example");
+    let dir = tempfile::tempdir().expect("temporary folder");
+    let path = dir.path().join("example.toml");
+    fs::write(&path, example).expect("file");
+    let Imported { scene, report } = read(&path);
+    assert_eq!(report.warnings, []);
+    assert_eq!((scene.instances.len(), scene.materials.len(), scene.cameras.len()), (2, 2, 1));
+}
+
 /// What each geometry looks like, by names: material, then image of its base colour.
 fn looks(scene: &SceneDesc, instances: std::ops::Range<usize>) -> Vec<(String, Option<String>)> {
     let geometries = scene.instances[instances].iter().flat_map(|i| &scene.meshes[i.mesh].geometries);

@@ -37,7 +37,7 @@ pub struct SceneDesc {
 pub struct Settings {
     /// Width and height of the picture in pixels.
     pub resolution: Option<(u32, u32)>,
-    /// Longest path, counted in edges (1: what the camera sees glowing, 2: direct light, ...).
+    /// Longest path, counted in edges (1: what the camera sees glowing, 2: direct light, ...; `u32::MAX`: unlimited).
     pub max_path_edges: Option<u32>,
     /// Index into [`SceneDesc::cameras`] of the camera that the file wants to be seen through (scene files say so;
     /// a model's cameras are only an offer).

@@ -53,6 +53,8 @@ pub struct Rendered {
     pub interrupted: bool,
 }
 
+/// No path has more bounces, whatever is asked for: between perfect mirrors it would never end.
+const MOST_BOUNCES: u32 = 1024;
 /// Rows of a band, the unit of work of a thread.
 const BAND: u32 = 4;
 /// Of so many pixels one is timed.
@@ -260,7 +262,7 @@ impl<'a> Job<'a> {
         let screen = [(at[0] / f64::from(self.options.width)) as f32, (at[1] / f64::from(self.options.height)) as f32];
         let mut seen = match self.method {
             Method::Light(follow) => {
-                let limits = Limits { bounces: self.options.max_depth, follow };
+                let limits = Limits { bounces: self.options.max_depth.min(MOST_BOUNCES), follow };
                 tracer.radiance(ray, self.cone, screen, sampler, limits)
             }
             Method::Occlusion(reach) => tracer.ambient_occlusion(ray, reach, sampler),
