@@ -221,7 +221,8 @@ impl Stage {
 
     /// Whether any hit has to be asked about before it counts.
     pub(crate) fn is_filtered(&self) -> bool {
-        self.flags.iter().any(|f| f.culls || f.alpha || f.lets_through)
+        self.plan.simulated().intersects(EffectSet::ALPHA_MASK | EffectSet::ALPHA_BLEND)
+            || self.flags.iter().any(|f| f.culls || f.alpha || f.lets_through)
     }
 }
 
