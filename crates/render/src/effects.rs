@@ -38,7 +38,7 @@ bitflags! {
         const VERTEX_COLORS = 1 << 13;
         /// Surfaces shown as they are.
         const UNLIT = 1 << 14;
-        /// Ambient occlusion (never called for by itself).
+        /// Ambient occlusion: of the even light in rooms that are lit from the camera, or as a picture of its own.
         const AMBIENT_OCCLUSION = 1 << 15;
         /// Section planes.
         const CLIPPING = 1 << 16;
@@ -126,6 +126,14 @@ impl EffectPlan {
             if !entry.by.contains(&by) {
                 entry.by.push(by.clone());
             }
+        }
+    }
+
+    /// Notes that the caller asks for an effect, whatever the scene calls for.
+    pub(crate) fn ask(&mut self, effect: EffectSet, by: &str) {
+        self.call(effect, by);
+        for entry in self.entries.iter_mut().filter(|e| effect.contains(e.effect)) {
+            entry.simulated = true;
         }
     }
 

@@ -96,7 +96,14 @@ pub fn render<M: Monitor + ?Sized>(
         (true, false) => job.run::<true, false, M>(&mut film, monitor),
         (true, true) => job.run::<true, true, M>(&mut film, monitor),
     };
-    let effects = stage.plan().with_costs(&done.rays, |kind| done.timing.seconds_per_ray(kind));
+    let mut plan = stage.plan().clone();
+    if !job.clip.is_all() {
+        plan.ask(EffectSet::CLIPPING, "the section asked for");
+    }
+    if matches!(job.method, Method::Occlusion(_)) {
+        plan.ask(EffectSet::AMBIENT_OCCLUSION, "the integrator");
+    }
+    let effects = plan.with_costs(&done.rays, |kind| done.timing.seconds_per_ray(kind));
     let stats = RenderStats {
         rays: done.rays,
         samples: done.samples,

@@ -133,7 +133,8 @@ impl Stage {
             survey::headlight(&scene, &accel, &camera, options.aspect, environment.is_some())
         };
         if headlight.is_some() {
-            plan.call(EffectSet::SHADOWS | EffectSet::PUNCTUAL_LIGHTS, "light at the camera");
+            let effects = EffectSet::SHADOWS | EffectSet::PUNCTUAL_LIGHTS | EffectSet::AMBIENT_OCCLUSION;
+            plan.call(effects, "light at the camera");
             explain.push(
                 "light: a light at the camera and a little even light were added, since there are no lights and the \
                  surroundings hardly reach what is seen"
@@ -163,7 +164,7 @@ impl Stage {
         let mut punctual = Vec::new();
         if effects.contains(EffectSet::PUNCTUAL_LIGHTS) {
             punctual.extend(world.scene.lights.iter().filter_map(|l| PunctualLight::new(&l.kind)));
-            punctual.extend(headlight.clone());
+            punctual.extend(headlight.as_ref().map(survey::Headlight::light));
         }
         let area = if effects.contains(EffectSet::AREA_LIGHTS) {
             let lights = world.scene.lights.iter().filter_map(|l| ShapeLight::new(&l.kind));
@@ -191,6 +192,7 @@ impl Stage {
             area,
             environment: environment.filter(|e| effects.contains(EffectSet::ENVIRONMENT) && !e.is_black()),
             ambient: if headlight.is_some() { survey::AMBIENT } else { Vec3::ZERO },
+            ambient_reach: headlight.as_ref().map_or(0.0, |h| 0.5 * h.distance),
         };
         Ok(Self { world, accel, materials, flags, lights, camera, background, reference, plan, explain })
     }

@@ -2,7 +2,7 @@
 
 use firsthit_import::SceneDesc;
 use firsthit_import::scene::{AlphaMode, LightKind, MaterialModel, PbrMaterial, SurfaceDesc};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::camera::Camera;
 use crate::integrator::ROUGHEST_FOLLOWED;
@@ -145,6 +145,20 @@ pub(crate) fn call_for_lights(plan: &mut EffectPlan, scene: &SceneDesc, environm
     }
 }
 
+/// A light at the camera.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Headlight {
+    position: DVec3,
+    /// How far away half of what is seen is.
+    pub(crate) distance: f64,
+}
+
+impl Headlight {
+    pub(crate) fn light(&self) -> PunctualLight {
+        PunctualLight::Headlight { position: self.position, irradiance: 2.5, distance: self.distance }
+    }
+}
+
 /// A light at the camera, if nothing lights the scene, or only surroundings that hardly reach what is seen.
 pub(crate) fn headlight(
     scene: &SceneDesc,
@@ -152,7 +166,7 @@ pub(crate) fn headlight(
     camera: &Camera,
     aspect: f64,
     surrounded: bool,
-) -> Option<PunctualLight> {
+) -> Option<Headlight> {
     /// With less of its hemisphere open to the surroundings a typical visible point counts as indoors.
     const INDOORS: f64 = 0.2;
     const ROWS: u32 = 18;
@@ -188,5 +202,5 @@ pub(crate) fn headlight(
     }
     distances.sort_unstable_by(f64::total_cmp);
     let distance = distances[distances.len() / 2];
-    Some(PunctualLight::Headlight { position: camera.position(), irradiance: 2.5, distance })
+    Some(Headlight { position: camera.position(), distance })
 }

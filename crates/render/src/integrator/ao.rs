@@ -7,9 +7,34 @@ use super::whitted::Seen;
 use super::{Tracer, aov};
 use crate::RayKind;
 use crate::sampler::{Dimension, PixelSampler};
+use crate::surface::Surface;
 use crate::warp;
 
+/// Keeps the numbers apart from those of the lobes.
+const BRANCH: u32 = 0x500_0000;
+
 impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> {
+    /// How much of the even light of rooms gets to a surface: one sample, where that is simulated, else all.
+    pub(super) fn openness(&mut self, surface: &Surface<'_>, sampler: PixelSampler, bounce: u32) -> f32 {
+        match self.occlusion_reach {
+            Some(reach) if bounce == 0 => self.free(surface, reach, sampler.branch(BRANCH), bounce),
+            _ => 1.0,
+        }
+    }
+
+    /// 1 if a cosine-weighted direction is free within `reach`, else 0.
+    fn free(&mut self, surface: &Surface<'_>, reach: f64, sampler: PixelSampler, bounce: u32) -> f32 {
+        let w = warp::cosine_hemisphere(sampler.get2(Dimension::Direction(bounce)));
+        let (x, y) = warp::frame(surface.smooth);
+        let direction = x * w.x + y * w.y + surface.smooth * w.z;
+        let mut lifted = surface.point;
+        lifted.position += surface.lift;
+        let origin = lifted.spawn(surface.geometric.as_dvec3());
+        let away = Ray::new(origin, direction.as_dvec3()).with_interval(0.0, reach);
+        let covers = sampler.get1(Dimension::Alpha(bounce));
+        if self.occluded(RayKind::AmbientOcclusion, &away, surface.id, covers) { 0.0 } else { 1.0 }
+    }
+
     /// One sample of the occlusion at the first surface that a camera ray meets; only what is nearer than `reach`
     /// occludes. Black and transparent where there is nothing.
     pub(crate) fn ambient_occlusion(&mut self, ray: Ray<f64>, reach: f64, sampler: PixelSampler) -> Seen {
@@ -21,16 +46,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
         let shading = stage.materials[material].shade::<TEXTURES>(&surface);
         let first = aov::First::new(&ray, &hit, &surface, &shading, material);
 
-        let w = warp::cosine_hemisphere(sampler.get2(Dimension::Direction(0)));
-        let (x, y) = warp::frame(surface.smooth);
-        let direction = x * w.x + y * w.y + surface.smooth * w.z;
-        let mut lifted = point;
-        lifted.position += surface.lift;
-        let origin = lifted.spawn(surface.geometric.as_dvec3());
-        let away = Ray::new(origin, direction.as_dvec3()).with_interval(0.0, reach);
-        let covers = sampler.get1(Dimension::Alpha(0));
-        let occluded = self.occluded(RayKind::AmbientOcclusion, &away, hit.id, covers);
-        let color = if occluded { Vec3::ZERO } else { Vec3::ONE };
+        let color = Vec3::splat(self.free(&surface, reach, sampler, 0));
         Seen { color, alpha: 1.0, first: Some(first) }
     }
 }

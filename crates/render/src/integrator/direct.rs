@@ -26,6 +26,8 @@ pub(super) struct Lit<'a> {
     pub(super) followed: [bool; 3],
     pub(super) sampler: PixelSampler,
     pub(super) bounce: u32,
+    /// Light goes into a solid here, out of which it comes bent another time: only rays that follow it tell.
+    pub(super) enters: bool,
 }
 
 impl Lit<'_> {
@@ -36,7 +38,8 @@ impl Lit<'_> {
         let behind = sample.direction.dot(self.surface.geometric) < 0.0;
         let mut total = Vec3::ZERO;
         for (lobe, followed) in self.bsdf.lobes().iter().zip(self.followed) {
-            if !(if lobe.kind() == LobeKind::TRANSMISSION { behind } else { before }) {
+            let through = lobe.kind() == LobeKind::TRANSMISSION;
+            if !(if through { behind && !self.enters } else { before }) {
                 continue;
             }
             let weight = match sample.pdf {

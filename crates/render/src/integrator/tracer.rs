@@ -44,6 +44,8 @@ pub(crate) struct Tracer<'a, const TEXTURES: bool, const FILTERED: bool> {
     pub(crate) stage: &'a Stage,
     clip: Option<&'a ClipRegion<f64>>,
     shadows: bool,
+    /// How near things must be to take even light away, where that is simulated.
+    pub(super) occlusion_reach: Option<f64>,
     pub(crate) counts: RayCounts,
     pub(crate) timing: Timing,
     /// Whether the rays of the current pixel are timed.
@@ -56,6 +58,11 @@ impl<'a, const TEXTURES: bool, const FILTERED: bool> Tracer<'a, TEXTURES, FILTER
             stage,
             clip: (!clip.is_all()).then_some(clip),
             shadows: stage.plan().simulated().contains(EffectSet::SHADOWS),
+            occlusion_reach: stage
+                .plan()
+                .simulated()
+                .contains(EffectSet::AMBIENT_OCCLUSION)
+                .then_some(stage.lights.ambient_reach),
             counts: RayCounts::default(),
             timing: Timing::default(),
             timed: false,

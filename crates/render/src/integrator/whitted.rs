@@ -310,6 +310,8 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
         } else if through {
             kind = RayKind::Transmission;
         }
+        // Light that enters a solid has not been sampled: see `Lit::enters`.
+        let shared = sample.pdf.filter(|_| !(kind == RayKind::Refraction && surface.front));
         let unbent = matches!(lobe, Lobe::SpecularTransmission(s) if s.eta == 1.0);
         let bounce = path.bounce + 1;
         pending.push(Pending {
@@ -323,7 +325,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
             cone: Cone { width: path.cone.width + path.cone.spread * t, spread: path.cone.spread },
             absorption,
             straight: path.straight && unbent,
-            chosen: sample.pdf.map(|pdf| Chosen { pdf, from: surface.point.position, normal: shading.bsdf.normal }),
+            chosen: shared.map(|pdf| Chosen { pdf, from: surface.point.position, normal: shading.bsdf.normal }),
             bright: if bounce <= ROULETTE { throughput.max_element() } else { path.bright },
         });
     }

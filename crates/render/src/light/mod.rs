@@ -39,8 +39,10 @@ pub(crate) struct Lights {
     pub(crate) area: area::AreaLights,
     /// Light from around; `None`: black.
     pub(crate) environment: Option<environment::Environment>,
-    /// Light that is everywhere, without shadow (rooms lit from the camera): radiance.
+    /// Light that is everywhere in rooms lit from the camera: radiance.
     pub(crate) ambient: Vec3,
+    /// How near things must be to take that light away.
+    pub(crate) ambient_reach: f64,
 }
 
 /// Weight of one of two ways to find the same light: Veach's power heuristic with exponent 2.
