@@ -182,9 +182,19 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
         for (f, lobe) in followed.iter_mut().zip(shading.bsdf.lobes()) {
             *f = is_followed(lobe, limits.follow, stage.reference);
         }
-        let lit = Lit { surface: &surface, bsdf: &shading.bsdf, followed, sampler: path.sampler, bounce: path.bounce };
-        let direct = self.direct(&lit) + shading.base_color * stage.lights.ambient;
-        seen.color += path.throughput * direct;
+        let lit = Lit {
+            surface: &surface,
+            bsdf: &shading.bsdf,
+            followed,
+            sampler: path.sampler,
+            bounce: path.bounce,
+            enters: material.solid && surface.front,
+        };
+        seen.color += path.throughput * self.direct(&lit);
+        if stage.lights.ambient != Vec3::ZERO {
+            let even = shading.base_color * stage.lights.ambient;
+            seen.color += path.throughput * even * self.openness(&surface, path.sampler, path.bounce);
+        }
         self.follow(&path, &surface, material, &shading, followed, hit.t, pending);
     }
 
