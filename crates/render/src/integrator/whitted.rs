@@ -266,7 +266,8 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
         }
         let mut share = 1.0;
         if path.bounce >= ROULETTE {
-            let chance = (total / path.bright).min(1.0);
+            // A little more, so that rounding never ends a path that has lost nothing.
+            let chance = (1.01 * total / path.bright).min(1.0);
             if !(path.sampler.get1(Dimension::Roulette(path.bounce)) < chance) {
                 return;
             }
