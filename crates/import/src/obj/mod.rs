@@ -1,4 +1,56 @@
-//! Wavefront OBJ with its material libraries (MTL).
+//! Wavefront OBJ with its material libraries (MTL), plain or compressed (`.obj.zst`, `.obj.gz`).
+//!
+//! Sources: Wavefront, "Advanced Visualizer Manual", appendix B1 (OBJ) and "MTL material format" (both kept at
+//! paulbourke.net/dataformats), and the physically based keywords of Clara.io (exocortex.com/blog/extending_wavefront_mtl_to_support_pbr).
+//!
+//! # What becomes of a file
+//! One mesh, with one geometry for each object, group and material that occur together; triangles keep the order of
+//! the faces. Its instance is placed by the identity, except for a model that lies more than 16 times its size away
+//! from its origin: that one is moved there in f64, so that f32 vertices keep its detail.
+//!
+//! | in the file | here |
+//! |---|---|
+//! | `v x y z`, indices from 1 or counted back by negative ones | as they are; an index out of range is an error with its line |
+//! | `v x y z r g b` | vertex colours, sRGB as Blender takes them; 0 to 255 if one exceeds 1 |
+//! | `v x y z w` | w is for rational surfaces and ignored |
+//! | `vt u v`, also `vt u` | v counted from the top instead; further dimensions are ignored |
+//! | `f` | any number of corners; concave ones are cut by ears in their plane |
+//! | a face with an infinite or undefined vertex, or of two corners | left out, warning |
+//! | `vn` or `vt` missing for some corners, out of range or undefined | flat, or (0, 0); warning unless just missing |
+//! | `s n` without normals | smooth over the group; `s off`, and faces outside of groups: flat |
+//! | neither `s` nor `vn` anywhere | smooth across edges of less than 40 degrees, also between vertices that are equal: a scan looks round, a box keeps its edges |
+//! | `l`, `p`, curves and free-form surfaces, unknown statements | passed over, warning |
+//! | `mtllib` or `usemtl` that lead nowhere | matt grey, warning |
+//!
+//! # Materials
+//! MTL describes the shading of 1990. It is mapped onto [`PbrMaterial`](crate::scene::PbrMaterial) like this:
+//!
+//! | MTL | here |
+//! |---|---|
+//! | `Kd`, `map_Kd` | base colour: factors are linear, images sRGB. Black beside a texture means white, as exporters use it |
+//! | `Ns` | roughness = (2 / (Ns + 2))^(1/4), which gives GGX the width of that Blinn-Phong lobe (Walter et al. 2007); `map_Ns` scales Ns |
+//! | `Ks`, `map_Ks` | reflectance 0.08 Ks at normal incidence, as Blender maps it: 0.5 is plastic. None for `illum` 0 and 1 |
+//! | `illum` 3, 5 | mirror: base colour Kd + Ks, metallic with the share of Ks in it, roughness 0 |
+//! | `illum` 6, 7 | solid glass of index `Ni`, roughness 0, tinted by `Tf` |
+//! | `illum` 4, 9 | thin glass, of transmission 1 - d if there is a `d` |
+//! | `Tf` | only its hue: some exporters write the share of light that passes, some the opposite |
+//! | `d`, or 1 - `Tr`; `map_d` | alpha, blended; of the image's alpha channel if it has one, else of its luminance |
+//! | `Ke`, `map_Ke` | emitted radiance |
+//! | `norm` | tangent-space normals, scaled by `-bm` |
+//! | `map_bump`, `bump` | the same if the image looks like normals; else heights, of a hundredth of the texture's width |
+//! | `Pr`, `Pm` with maps | roughness, metallic; they win over what Ns and illum say |
+//! | `-s`, `-o`, `-clamp`, `-mm`, `-bm`, `-imfchan` | honoured; `-blendu`, `-boost`, `-texres`, `-colorspace` change nothing here; `-t`, `-type`: warning |
+//! | `Ka`, `sharpness` | nothing: ambient light is traced |
+//! | `Pc`, `Pcr`, `Ps`, `aniso`, `anisor`, `disp`, `decal`, `refl` | not rendered, warning |
+//!
+//! All surfaces are seen from both sides, as OBJ knows no other. A texture is looked for beside its library, then
+//! beside the model; if its path leads nowhere or out of the model's folder, its bare name is tried.
+//!
+//! # Why there is an own reader beside tobj
+//! tobj parses the materials (see `mtl`). The statements of OBJ itself are read here, since tobj 4.0 drops
+//! smoothing groups and the names of missing materials, stops at line continuations, one-component `vt` and incomplete
+//! colours, and reports an error without its line; preparing the text for it would be a reader already. The tests
+//! hold the two against each other where tobj can read a file.
 
 mod material;
 mod mesh;
@@ -19,19 +71,30 @@ use crate::files::{self, Folder};
 use crate::scene::{GeometryDesc, ImageDesc, InstanceDesc, MaterialDesc, MeshDesc, SurfaceDesc};
 use crate::{ImportError, Imported, Options, Report, SceneDesc};
 
-/// Reads an OBJ file and the files it names.
+/// Reads an OBJ file and the material libraries and images it names.
+///
+/// ```
+/// # let dir = tempfile::tempdir()?;
+/// # let path = dir.path().join("square.obj");
+/// std::fs::write(&path, "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n")?;
+/// let imported = firsthit_import::obj::read(&path, &Default::default())?;
+/// assert_eq!(imported.report.triangles_all_scenes, 2);
+/// assert_eq!(imported.scene.name, "square");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
-/// [`ImportError`] names the line.
+/// [`ImportError`] with the line and what is wrong there. Libraries and images that cannot be read are only warnings.
 pub fn read(path: impl AsRef<Path>, options: &Options) -> Result<Imported, ImportError> {
     let path = path.as_ref();
     read_bytes(files::read(path, &options.limits)?, path, options)
 }
 
-/// As [`read`], of bytes at hand; the files they name are looked for beside `path`.
+/// As [`read`], of bytes at hand, not compressed. The files they name are looked for beside `path`, which need not
+/// exist itself.
 ///
 /// # Errors
-/// [`ImportError`] names the line.
+/// As for [`read`].
 pub fn read_bytes(bytes: Vec<u8>, path: impl AsRef<Path>, options: &Options) -> Result<Imported, ImportError> {
     let path = path.as_ref();
     let mut report = Report::default();
@@ -85,7 +148,12 @@ impl Materials {
                 (materials, images, found)
             }
             // Bytes without a file: nothing lies beside them.
-            Err(_) => (Vec::new(), Vec::new(), HashMap::new()),
+            Err(e) => {
+                for (line, name) in &model.libraries {
+                    report.warn(path, parse::place(*line), format!("material library '{name}': {}", e.kind));
+                }
+                (Vec::new(), Vec::new(), HashMap::new())
+            }
         };
         let has_colors = !model.colors.is_empty();
         let mut missing = Vec::new();
@@ -117,3 +185,6 @@ fn scene_name(path: &Path) -> String {
     let end = name.to_ascii_lowercase().rfind(".obj").unwrap_or(name.len());
     name.get(..end).unwrap_or_default().to_owned()
 }
+
+#[cfg(test)]
+mod tests;

@@ -45,12 +45,16 @@ fn position(model: &Model, index: u32) -> DVec3 {
     model.positions[index as usize].into()
 }
 
-/// Angle of a face at its k-th corner.
+/// Angle of a face at its k-th corner, seen past corners at the same place.
 fn angle(model: &Model, face: usize, k: usize) -> f64 {
     let corners = &model.corners[model.faces[face].range()];
-    let at = |k: usize| position(model, corners[k % corners.len()].position);
-    let (to_next, to_last) = (at(k + 1) - at(k), at(k + corners.len() - 1) - at(k));
-    f64::atan2(to_next.cross(to_last).length(), to_next.dot(to_last))
+    let n = corners.len();
+    let at = |k: usize| position(model, corners[k % n].position);
+    let edge = |step: usize| (1..n).map(|d| at(k + step * d) - at(k)).find(|e| *e != DVec3::ZERO);
+    match (edge(1), edge(n - 1)) {
+        (Some(next), Some(last)) => f64::atan2(next.cross(last).length(), next.dot(last)),
+        _ => 0.0,
+    }
 }
 
 fn by_groups(model: &mut Model, normals: &[DVec3]) {
@@ -79,12 +83,23 @@ fn by_groups(model: &mut Model, normals: &[DVec3]) {
     model.normals.extend(sums.iter().map(|n| n.normalize_or(DVec3::Z).as_vec3().to_array()));
 }
 
+/// For each position the first one that is equal to it: simple programs write the corners of every triangle anew.
+fn welded(model: &Model) -> Vec<u32> {
+    let mut first = HashMap::with_capacity(model.positions.len());
+    let same = model.positions.iter().enumerate().map(|(i, p)| {
+        // Adding zero makes -0 and 0 equal.
+        *first.entry(p.map(|x| (x + 0.0).to_bits())).or_insert(i as u32)
+    });
+    same.collect()
+}
+
 fn by_creases(model: &mut Model, normals: &[DVec3]) {
+    let welded = welded(model);
     // The corners at each position, in the order of the file: `around[start[p]..start[p + 1]]`, as (face, k).
     let mut start = vec![0_u32; model.positions.len() + 1];
     for face in &model.faces {
         for c in &model.corners[face.range()] {
-            start[c.position as usize + 1] += 1;
+            start[welded[c.position as usize] as usize + 1] += 1;
         }
     }
     for p in 1..start.len() {
@@ -94,7 +109,7 @@ fn by_creases(model: &mut Model, normals: &[DVec3]) {
     let mut around = vec![(0_u32, 0_u32); start.last().map_or(0, |&n| n as usize)];
     for (f, face) in model.faces.iter().enumerate() {
         for (k, c) in model.corners[face.range()].iter().enumerate() {
-            let slot = &mut next[c.position as usize];
+            let slot = &mut next[welded[c.position as usize] as usize];
             around[*slot as usize] = (f as u32, k as u32);
             *slot += 1;
         }
