@@ -70,7 +70,8 @@ fn every_shape_is_where_the_file_says() {
     // What the object is, a ray, and where and with which normal it must meet it.
     let down = [0.0, -1.0, 0.0];
     let left = [-1.0, 0.0, 0.0];
-    let cases: [(&str, &str, [f64; 3], [f64; 3], f64, [f64; 3]); 22] = [
+    type Case<'a> = (&'a str, &'a str, [f64; 3], [f64; 3], f64, [f64; 3]);
+    let cases: [Case<'_>; 22] = [
         ("sphere", "center = [1, 2, 3], radius = 2", [1.0, 9.0, 3.0], down, 5.0, [0.0, 1.0, 0.0]),
         ("plane", "point = [0, 1, 0], normal = [0, 2, 0]", [5.0, 4.0, 5.0], down, 3.0, [0.0, 1.0, 0.0]),
         ("disk", "center = [0, 1, 0], normal = [0, 1, 0], radius = 2", [1.0, 4.0, 1.0], down, 3.0, [0.0, 1.0, 0.0]),
