@@ -51,7 +51,7 @@ impl Distribution2D {
     /// `None` where there is no positive finite total, or `weights` is not whole rows of `width` cells.
     #[must_use]
     pub fn new(weights: &[f32], width: usize) -> Option<Self> {
-        if width == 0 || weights.len() % width != 0 {
+        if width == 0 || !weights.len().is_multiple_of(width) {
             return None;
         }
         let height = weights.len() / width;

@@ -27,7 +27,7 @@ impl Accumulator {
             *sum += x;
         }
         self.count += 1;
-        if self.count % BLOCK == 0 {
+        if self.count.is_multiple_of(BLOCK) {
             self.total = self.sum();
             self.block = [0.0; 4];
         }
@@ -59,7 +59,6 @@ impl Accumulator {
 /// let mut film = Film::new(2, 1, None, &[]);
 /// let mut band = film.bands_mut(8).next().unwrap();
 /// band.pixel(1, 0)[0].add([0.5, 0.25, 0.0, 1.0]);
-/// drop(band);
 /// assert_eq!(film.color().pixels, [[0.0; 4], [0.5, 0.25, 0.0, 1.0]]);
 /// ```
 #[derive(Clone, Debug, PartialEq)]
@@ -277,7 +276,6 @@ mod tests {
         let mut band = film.bands_mut(1).next().unwrap();
         band.pixel(0, 0)[1].add([3.0, 3.0, 3.0, 1.0]);
         band.pixel(0, 0)[1].add([0.0, 0.0, 0.0, 0.0]);
-        drop(band);
         let depth = film.aov(Aov::Depth).unwrap();
         assert_eq!(depth.pixels[0], [3.0, 3.0, 3.0, 0.5]);
         assert_eq!(depth.pixels[1], [f32::INFINITY, f32::INFINITY, f32::INFINITY, 0.0]);

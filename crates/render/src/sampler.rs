@@ -210,7 +210,7 @@ mod tests {
         const N: u32 = 4096;
         let centred = |s: PixelSampler, d| f64::from(s.get1(d)) - 0.5;
         let correlation =
-            |f: &dyn Fn(u32) -> (f64, f64)| (0..N).map(|i| f(i)).map(|(a, b)| a * b).sum::<f64>() / f64::from(N) * 12.0;
+            |f: &dyn Fn(u32) -> (f64, f64)| (0..N).map(f).map(|(a, b)| a * b).sum::<f64>() / f64::from(N) * 12.0;
         // The standard deviation for independent numbers is 1/sqrt(N) = 1/64; 5 sigma.
         let bound = 5.0 / 64.0;
         for (i, a) in DIMENSIONS.into_iter().enumerate() {

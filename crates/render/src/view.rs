@@ -73,16 +73,21 @@ impl View {
     /// The display's values in [0, 1] of a linear colour. NaN and negative components count as 0.
     #[must_use]
     pub fn apply(&self, radiance: Vec3) -> Vec3 {
-        // `max` answers 0 for NaN. Infinity becomes the largest number, so that no difference of infinities arises.
-        let c = (radiance * self.exposure.exp2()).map(|x| x.max(0.0).min(f32::MAX));
+        // Infinity becomes the largest number, so that no difference of infinities arises.
+        let c = (radiance * self.exposure.exp2()).map(|x| within(x, f32::MAX));
         let display = match self.transform {
             ViewTransform::PbrNeutral => pbr_neutral(c).map(linear_to_srgb),
             ViewTransform::Agx => agx(c),
             ViewTransform::Srgb => c.map(linear_to_srgb),
             ViewTransform::None => c,
         };
-        display.map(|x| x.max(0.0).min(1.0))
+        display.map(|x| within(x, 1.0))
     }
+}
+
+/// `x` cut to [0, `most`]; 0 for NaN.
+fn within(x: f32, most: f32) -> f32 {
+    if x > 0.0 { x.min(most) } else { 0.0 }
 }
 
 /// The sRGB curve, IEC 61966-2-1: linear [0, 1] to encoded [0, 1]; clipped outside.

@@ -277,8 +277,7 @@ fn sanitised(pixels: Arc<[[f32; 3]]>) -> Arc<[[f32; 3]]> {
     if pixels.iter().flatten().all(fine) {
         return pixels;
     }
-    // `max` answers 0 for NaN.
-    pixels.iter().map(|p| p.map(|x| x.max(0.0).min(BRIGHTEST))).collect()
+    pixels.iter().map(|p| p.map(|x| if x > 0.0 { x.min(BRIGHTEST) } else { 0.0 })).collect()
 }
 
 #[cfg(test)]

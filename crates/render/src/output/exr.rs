@@ -46,9 +46,11 @@ pub(super) fn write(out: &mut impl Write, film: &Film, layers: Layers) -> io::Re
     }
 
     let (window, (width, height)) = (film.window(), film.size());
-    let mut attributes = LayerAttributes::default();
-    attributes.software_name = Some(Text::new_or_panic("firsthit"));
-    attributes.layer_position = Vec2(window.x as i32, window.y as i32);
+    let attributes = LayerAttributes {
+        software_name: Some(Text::new_or_panic("firsthit")),
+        layer_position: Vec2(window.x as i32, window.y as i32),
+        ..LayerAttributes::default()
+    };
     let layer = Layer::new(
         (window.width as usize, window.height as usize),
         attributes,
