@@ -150,7 +150,8 @@ impl<R: Real> Cuboid<R> {
         let (axis, upper) = axis_upper.unwrap_or((0, false));
         let (_, face) = gap(axis, upper);
         let p = if face.is_finite() { point.with_axis(axis, face) } else { point };
-        (p, R::gamma(4) * face.abs())
+        let size = bounds.min.abs().max(bounds.max.abs()).axis(axis);
+        (p, R::gamma(4) * if size.is_finite() { size } else { face.abs() })
     }
 }
 

@@ -88,7 +88,8 @@ impl<R: Real> Plane<R> {
         let l = point - self.point;
         let p = point - self.unit * self.unit.dot(l);
         // 3 units of |l| from the normal and the inner product, 3 from the next test, 2 from the coordinates.
-        (p, R::gamma(8) * l.abs().max_element() * R::TWO + R::gamma(3) * p.abs().max_element())
+        let error = R::gamma(16) * l.abs().max_element() + R::gamma(3) * p.abs().max_element();
+        (p, error.max(R::MIN_POSITIVE))
     }
 }
 

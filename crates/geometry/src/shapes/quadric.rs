@@ -56,8 +56,8 @@ impl QuadricKind {
 /// from +X seen from +Y); `v` is y, from 0 to 1 across the bounds where those are finite. A line in the surface (a
 /// generator of a cone) misses it. To close the surface by caps see [`Solid`](super::Solid).
 ///
-/// Error of `t`: `16 kappa u` relative, `kappa` the condition of the root. The equation is solved near the point of
-/// the ray closest to the origin, in units of the surface's size, or the constant term would lose its digits far away.
+/// Error of `t`: `16 kappa u` relative, `kappa` the condition of the root. The equation is solved from the point of the
+/// ray where its terms are smallest, in units of the surface's size, or the constant term would lose its digits far away.
 ///
 /// ```
 /// use firsthit_geometry::{Primitive, Ray, shapes::Quadric};
@@ -85,12 +85,17 @@ struct Form<R: Real> {
     rows: [R::Vec3; 3],
     g: R::Vec3,
     j: R,
+    /// How strongly each coordinate enters: the absolute row sums of `M`, and `g`.
+    weights: R::Vec3,
 }
 
 impl<R: Real> Form<R> {
     fn new([a, b, c, d, e, f, g, h, i, j]: [R; 10]) -> Self {
         let rows = [R::Vec3::new(a, b, c), R::Vec3::new(b, e, f), R::Vec3::new(c, f, h)];
-        Self { rows, g: R::Vec3::new(d, g, i), j }
+        let row_sums = rows.map(|r| r.abs().dot(R::Vec3::splat(R::ONE)));
+        let g = R::Vec3::new(d, g, i);
+        let weights = R::Vec3::new(row_sums[0], row_sums[1], row_sums[2]) + g.abs();
+        Self { rows, g, j, weights }
     }
 
     fn linear(&self, v: R::Vec3) -> R::Vec3 {
@@ -108,8 +113,18 @@ impl<R: Real> Form<R> {
 
     /// The sum of the absolute values of the terms of [`Self::value`].
     fn magnitude(&self, p: R::Vec3) -> R {
-        let [x, y, z] = self.rows.map(R::Vec3::abs);
-        Self { rows: [x, y, z], g: self.g.abs(), j: self.j.abs() }.value(p.abs())
+        Self { rows: self.rows.map(R::Vec3::abs), g: self.g.abs(), j: self.j.abs(), ..*self }.value(p.abs())
+    }
+
+    /// The parameter of the point of a line where the terms of the form are about smallest: nearest to the origin, with
+    /// each coordinate weighed by its part in the form. (By plain distance a flat surface - an ellipsoid with one small
+    /// radius - would lose digits: the point nearest the origin may lie many thicknesses off.)
+    fn calmest(&self, origin: R::Vec3, direction: R::Vec3) -> R {
+        let (w, d) = (self.weights, direction);
+        let weighted = R::Vec3::new(w.x() * d.x(), w.y() * d.y(), w.z() * d.z());
+        let t = -(origin.dot(weighted) / direction.dot(weighted));
+        // Where no coordinate that changes along the line enters at all, any point is as good.
+        if t.is_finite() { t } else { R::ZERO }
     }
 
     /// `a`, `b`, `c` of the restriction `a t^2 + 2 b t + c` to a line.
@@ -120,7 +135,7 @@ impl<R: Real> Form<R> {
     }
 }
 
-/// A ray in the units of the form: near the origin and with a direction of about unit length.
+/// A ray in the units of the form: started where its terms are small and with a direction of about unit length.
 pub(super) struct LocalLine<R: Real> {
     origin: R::Vec3,
     direction: R::Vec3,
@@ -307,7 +322,7 @@ impl<R: Real> Quadric<R> {
         let speed = ray.direction.abs().max_element().power_of_two_below();
         let direction = ray.direction * (R::ONE / speed);
         let origin = ray.origin * (R::ONE / self.size);
-        let shift = -(origin.dot(direction) / direction.dot(direction));
+        let shift = self.form.calmest(origin, direction);
         LocalLine { origin: origin + direction * shift, direction, shift, scale: self.size / speed }
     }
 
@@ -343,15 +358,10 @@ impl<R: Real> Quadric<R> {
         })
     }
 
-    /// The box around the clipped surface, without the padding for rounding.
-    pub(super) fn tight_bounds(&self) -> Aabb<R> {
-        self.bounds
-    }
-
     /// The box around the part of the clip box where the form is negative.
     pub(super) fn solid_bounds(&self) -> Aabb<R> {
         let b = region_bounds(self.coefficients.map(R::to_f64), self.clip.to_f64());
-        padded(Aabb::new(R::Vec3::from_f64(b.min), R::Vec3::from_f64(b.max)))
+        Aabb::new(R::Vec3::from_f64(b.min), R::Vec3::from_f64(b.max))
     }
 
     /// The hit at a local point.
@@ -422,8 +432,7 @@ impl<R: Real> Primitive<R> for Quadric<R> {
         let slope = R::TWO * self.form.half_gradient(p).length();
         let value = self.form.value(p).abs() + R::gamma(24) * self.form.magnitude(p);
         // The root s of `slope s - curvature s^2 = value`, or where that has none its order of magnitude.
-        let curvature = self.form.rows.map(|r| r.abs().dot(R::Vec3::splat(R::ONE)));
-        let curvature = curvature[0].max(curvature[1]).max(curvature[2]);
+        let curvature = self.form.weights.max_element();
         let reach = (slope * slope - R::TWO * R::TWO * curvature * value).max(R::ZERO).sqrt();
         let left = R::TWO * value / (slope + reach).max((curvature * value).sqrt());
         let left = if left.is_finite() { left } else { R::ZERO };

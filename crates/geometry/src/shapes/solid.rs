@@ -1,5 +1,6 @@
 //! Quadrics closed by caps.
 
+use super::common::padded;
 use super::cuboid::stay;
 use super::{Cuboid, Primitive, Quadric, ShapeError, SurfaceHit};
 use crate::quadratic::roots;
@@ -23,6 +24,7 @@ use crate::{Aabb, Ray, Real, Vector3};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Solid<R: Real> {
     surface: Quadric<R>,
+    bounds: Aabb<R>,
 }
 
 /// An end of an interval of the ray inside the solid.
@@ -39,7 +41,7 @@ impl<R: Real> Solid<R> {
     /// of [`Quadric`]'s named constructors.
     #[must_use]
     pub fn new(surface: Quadric<R>) -> Self {
-        Self { surface }
+        Self { surface, bounds: surface.solid_bounds() }
     }
 
     /// The open surface.
@@ -89,7 +91,7 @@ impl<R: Real> Solid<R> {
             if let Some((t, end)) = found {
                 return Some(match end {
                     End::Side(local) => self.surface.hit_at(&line, t, local),
-                    End::Cap { axis, entry } => Cuboid::face_hit(&self.surface.tight_bounds(), ray, t, axis, entry),
+                    End::Cap { axis, entry } => Cuboid::face_hit(&self.bounds, ray, t, axis, entry),
                 });
             }
         }
@@ -99,7 +101,7 @@ impl<R: Real> Solid<R> {
 
 impl<R: Real> Primitive<R> for Solid<R> {
     fn bounds(&self) -> Aabb<R> {
-        self.surface.solid_bounds()
+        padded(self.bounds)
     }
 
     fn closest_hit(&self, ray: &Ray<R>) -> Option<SurfaceHit<R>> {
