@@ -14,9 +14,10 @@ use crate::{Aabb, Ray, Real, Vector3};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane<R: Real> {
     point: R::Vec3,
-    /// As given, but for a power of two: dividing by the length here would tilt the plane by the rounding.
+    /// The normal as given, but for a power of two: dividing by its length would tilt the plane by the rounding.
+    raw: R::Vec3,
+    /// The unit normal.
     normal: R::Vec3,
-    unit: R::Vec3,
     /// Whether rays that come from behind (travelling along the normal) pass through.
     pub cull_back: bool,
 }
@@ -30,7 +31,7 @@ impl<R: Real> Plane<R> {
         finite::<R>("point", point)?;
         finite::<R>("normal", normal)?;
         let unit = unit::<R>(normal).ok_or(ShapeError::Degenerate("the normal is zero"))?;
-        Ok(Self { point, normal: balanced::<R>(normal), unit, cull_back: false })
+        Ok(Self { point, raw: balanced::<R>(normal), normal: unit, cull_back: false })
     }
 
     /// The same plane with culling of its back side on or off.
@@ -48,7 +49,7 @@ impl<R: Real> Plane<R> {
     /// The unit normal.
     #[must_use]
     pub fn normal(&self) -> R::Vec3 {
-        self.unit
+        self.normal
     }
 
     /// The same plane in another arithmetic.
@@ -56,7 +57,7 @@ impl<R: Real> Plane<R> {
     /// # Errors
     /// When a parameter leaves the range of `S`.
     pub fn cast<S: Real>(&self) -> Result<Plane<S>, ShapeError> {
-        let plane = Plane::new(cast::<R, S>(self.point), cast::<R, S>(self.normal))?;
+        let plane = Plane::new(cast::<R, S>(self.point), cast::<R, S>(self.raw))?;
         Ok(plane.with_culling(self.cull_back))
     }
 
@@ -67,11 +68,11 @@ impl<R: Real> Plane<R> {
     #[inline]
     #[must_use]
     pub fn crossing(&self, ray: &Ray<R>) -> Option<R> {
-        let slope = self.normal.dot(ray.direction);
+        let slope = self.raw.dot(ray.direction);
         if slope == R::ZERO || (self.cull_back && slope > R::ZERO) {
             return None;
         }
-        Some(self.normal.dot(self.point - ray.origin) / slope)
+        Some(self.raw.dot(self.point - ray.origin) / slope)
     }
 
     /// [`Self::crossing`] in the interval of a valid ray.
@@ -86,7 +87,7 @@ impl<R: Real> Plane<R> {
     /// Projects a point onto the plane; see [`Primitive::refine`].
     pub(super) fn project(&self, point: R::Vec3) -> (R::Vec3, R) {
         let l = point - self.point;
-        let p = point - self.unit * self.unit.dot(l);
+        let p = point - self.normal * self.normal.dot(l);
         // 3 units of |l| from the normal and the inner product, 3 from the next test, 2 from the coordinates.
         let error = R::gamma(16) * l.abs().max_element() + R::gamma(3) * p.abs().max_element();
         (p, error.max(R::MIN_POSITIVE))
@@ -101,8 +102,8 @@ impl<R: Real> Primitive<R> for Plane<R> {
     fn closest_hit(&self, ray: &Ray<R>) -> Option<SurfaceHit<R>> {
         let t = self.nearest(ray)?;
         let l = (ray.origin - self.point) + ray.direction * t;
-        let (tangent, bitangent) = tangents::<R>(self.unit);
-        Some(SurfaceHit { t, u: l.dot(tangent), v: l.dot(bitangent), normal: Some(self.unit) })
+        let (tangent, bitangent) = tangents::<R>(self.normal);
+        Some(SurfaceHit { t, u: l.dot(tangent), v: l.dot(bitangent), normal: Some(self.normal) })
     }
 
     fn any_hit(&self, ray: &Ray<R>) -> bool {
