@@ -1,7 +1,12 @@
-//! The hard cases at every tier: exact expected answers, by each primitive's own test and through a scene.
+//! The hard cases at every tier: exact expected answers, by each primitive's own test and through a scene; and rays
+//! that leave shapes.
 
-use firsthit_geometry::Precision;
+use firsthit_accel::{BuildOptions, Geometry, SceneBuilder};
+use firsthit_geometry::shapes::{Cuboid, Quadric, Solid, Sphere};
+use firsthit_geometry::{Precision, Ray, Shape};
 use firsthit_tests::corpus::{self, Case, Engine};
+use glam::{DAffine3, DQuat, DVec3};
+use proptest::prelude::*;
 
 fn cases() -> Vec<Case> {
     corpus::read(&corpus::folder()).expect("the hard cases can be read")
@@ -41,4 +46,74 @@ fn the_fast_tier_is_caught_leaking() {
     let watertight: Vec<Case> = cases().into_iter().filter(|c| c.group == "watertight").collect();
     let fast = corpus::run(&watertight, Precision::Fast, corpus::primitives);
     assert!(watertight.is_empty() || !fast.excused.is_empty(), "no case shows the leaks of the shortest formula");
+}
+
+/// Closed convex shapes of about unit size.
+fn convex() -> impl Strategy<Value = Shape<f64>> {
+    let size = || 0.2..1.0_f64;
+    prop_oneof![
+        size().prop_map(|r| Sphere::new(DVec3::splat(0.1), r).map(Shape::from)),
+        (size(), size()).prop_map(|(x, y)| Cuboid::new(DVec3::ZERO, DVec3::new(x, y, 1.0)).map(Shape::from)),
+        (size(), size()).prop_map(|(r, y)| Quadric::cylinder(r, -y, y).map(|q| Solid::new(q).into())),
+        (size(), size()).prop_map(|(r, y)| Quadric::cone(r, 0.0, y).map(|q| Solid::new(q).into())),
+        (size(), size()).prop_map(|(r, y)| Quadric::paraboloid(r, y).map(|q| Solid::new(q).into())),
+        (size(), size()).prop_map(|(a, b)| Quadric::ellipsoid(DVec3::new(a, b, 1.0)).map(|q| Solid::new(q).into())),
+    ]
+    .prop_map(|shape| shape.expect("valid parameters"))
+}
+
+fn vector() -> impl Strategy<Value = DVec3> {
+    let x = || -1.0..1.0_f64;
+    (x(), x(), x()).prop_map(|(x, y, z)| DVec3::new(x, y, z))
+}
+
+/// Turned, stretched unevenly and carried far away.
+fn placement() -> impl Strategy<Value = DAffine3> {
+    let factor = || (-2.0..2.0_f64).prop_map(|e| 10.0_f64.powf(e));
+    let away = prop_oneof![Just(0.0), (0.0..7.0_f64).prop_map(|e| 10.0_f64.powf(e))];
+    (vector(), 0.0..6.3_f64, (factor(), factor(), factor()), vector(), away).prop_filter_map(
+        "a rotation needs an axis",
+        |(axis, angle, (x, y, z), direction, away)| {
+            let rotation = DQuat::from_axis_angle(axis.try_normalize()?, angle);
+            Some(DAffine3::from_scale_rotation_translation(DVec3::new(x, y, z), rotation, direction * away))
+        },
+    )
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 4000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// A ray that leaves a convex solid never meets it again, and one that goes in comes out: no self-intersection and
+    /// no leak, wherever the solid stands and however it is stretched.
+    #[test]
+    fn rays_leave_convex_shapes_for_good(
+        shape in convex(), placed in placement(), from in vector(), to in vector(), away in vector(),
+        precision in prop::sample::select(Precision::ALL.to_vec()),
+    ) {
+        let mut builder = SceneBuilder::new(BuildOptions { precision, ..BuildOptions::default() });
+        let mesh = builder.add_mesh(vec![Geometry::Shape(shape)]);
+        builder.add_instance(mesh, placed);
+        let scene = builder.build().expect("a valid scene");
+
+        let world = |p: DVec3| placed.transform_point3(p);
+        let (eye, target) = (world(from.normalize_or(DVec3::X) * 10.0), world(to));
+        let ray = Ray::<f64>::new(eye, target - eye);
+        let Some(hit) = scene.closest_hit(&ray) else { return Ok(()) };
+        prop_assert!(hit.normal.dot(ray.direction) <= 0.0, "from outside, the front is met first");
+        // At an apex there is no side to leave to.
+        prop_assume!(hit.normal != DVec3::ZERO && away.length() > 0.01);
+
+        let point = scene.surface_point(&ray, &hit);
+        let outward = if away.dot(hit.normal) < 0.0 { -away } else { away };
+        let leaving = Ray::<f64>::new(point.spawn(outward), outward);
+        prop_assert_eq!(scene.closest_hit(&leaving).map(|h| h.t), None);
+
+        // Straight on through the solid, unless only an edge was grazed.
+        if hit.normal.dot(ray.direction.normalize()) < -0.01 {
+            let inner = Ray::<f64>::new(point.spawn(ray.direction), ray.direction);
+            if let Some(exit) = scene.closest_hit(&inner) {
+                prop_assert!(exit.normal.dot(ray.direction) >= 0.0, "hit the front again at {}", exit.t);
+            }
+        }
+    }
 }

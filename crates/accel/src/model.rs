@@ -59,6 +59,8 @@ pub(crate) struct ModelShape {
     pub(crate) shape: Shape<f64>,
     /// Its box, normalised.
     bounds: Aabb<f64>,
+    /// Size of the normalised space's unit, a power of two.
+    scale: f64,
 }
 
 /// What a hit's id stands for.
@@ -120,7 +122,7 @@ impl Model {
                     } else {
                         model.unbounded.push(index);
                     }
-                    model.shapes.push(ModelShape { geometry: g, shape: shape.clone(), bounds });
+                    model.shapes.push(ModelShape { geometry: g, shape: shape.clone(), bounds, scale });
                 }
             }
         }
@@ -300,9 +302,15 @@ impl Model {
 }
 
 impl ModelShape {
+    /// [`Primitive::refine`] for a point of the normalised space.
+    pub(crate) fn refine(&self, point: DVec3, normal: Option<DVec3>) -> (DVec3, f64) {
+        let (point, error) = self.shape.refine(point * self.scale, normal);
+        (point / self.scale, error / self.scale)
+    }
+
     /// Whether no straight ray that leaves it can come back.
     pub(crate) fn is_flat(&self) -> bool {
-        matches!(self.shape.kind(), "plane" | "disk" | "annulus" | "polygon" | "rectangle")
+        self.shape.is_flat()
     }
 }
 

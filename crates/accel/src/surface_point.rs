@@ -6,10 +6,6 @@ use glam::DVec3;
 use crate::model::Surface;
 use crate::{Hit, Scene, SurfacePoint};
 
-/// Roundings in the evaluation of a shape, its coordinates' magnitude being the unit: the longest formula (a general
-/// quadric) has about sixty operations.
-const SHAPE_ROUNDINGS: u32 = 64;
-
 impl Scene {
     /// Where exactly a hit is, for starting other rays there. `ray` is the ray that found it.
     ///
@@ -25,16 +21,13 @@ impl Scene {
                 let (point, error) = on_triangle(v, hit, self.options().precision);
                 (point, error, triangle::normal(v).unwrap_or(DVec3::ZERO))
             }
-            Surface::Shape(_) => {
+            Surface::Shape(s) => {
                 // In the object's space: far from the world's origin `ray.at(t)` has lost digits that are known here.
-                let local = transform.ray_to_object(ray);
-                let along = local.direction * hit.t;
-                let point = local.origin + along;
-                // Rounding in each step from the ray to the point is relative to these.
-                let magnitude = (local.origin.abs() + along.abs()).max_element();
+                let point = transform.ray_to_object(ray).at(hit.t);
                 // A unit normal of the world, back: the inverse transpose of the inverse transpose.
                 let normal = (transform.linear().transpose() * hit.normal).normalize_or_zero();
-                (point, DVec3::splat(magnitude * gamma(SHAPE_ROUNDINGS)), normal)
+                let (point, error) = s.refine(point, (normal != DVec3::ZERO).then_some(normal));
+                (point, DVec3::splat(error), normal)
             }
         };
         let position = transform.point(point);

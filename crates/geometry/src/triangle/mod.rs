@@ -27,9 +27,9 @@ pub struct TriangleHit<R: Real> {
 
 /// The hit of a ray with a triangle by the test of a tier, rounded to `R`.
 ///
-/// * [`Precision::Fast`]: [`fast()`].
-/// * [`Precision::Robust`]: [`watertight()`] in `R`.
-/// * [`Precision::Double`]: [`watertight()`] in `f64` (to keep its digits, take `R = f64`).
+/// * [`Precision::Fast`] is [`fast()`].
+/// * [`Precision::Robust`] is [`watertight()`] in `R`.
+/// * [`Precision::Double`] is [`watertight()`] in `f64` (to keep its digits, take `R = f64`).
 ///
 /// ```
 /// use firsthit_geometry::{Precision, Ray, triangle};
