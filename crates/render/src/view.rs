@@ -91,17 +91,21 @@ fn within(x: f32, most: f32) -> f32 {
 }
 
 /// The sRGB curve, IEC 61966-2-1: linear [0, 1] to encoded [0, 1]; clipped outside.
+///
+/// In f64 inside, so that the answer is the nearest f32, and that of 1 is 1.
 #[must_use]
 pub fn linear_to_srgb(x: f32) -> f32 {
-    let x = x.clamp(0.0, 1.0);
-    if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
+    let x = f64::from(x.clamp(0.0, 1.0));
+    let encoded = if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 };
+    encoded as f32
 }
 
 /// The inverse of [`linear_to_srgb`].
 #[must_use]
 pub fn srgb_to_linear(x: f32) -> f32 {
-    let x = x.clamp(0.0, 1.0);
-    if x <= 0.040_45 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
+    let x = f64::from(x.clamp(0.0, 1.0));
+    let linear = if x <= 0.040_45 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) };
+    linear as f32
 }
 
 /// Khronos PBR Neutral Tone Mapper, specification of 2024, with its constants: linear to linear.
