@@ -117,3 +117,33 @@ proptest! {
         }
     }
 }
+
+/// `docs/from-the-lecture.md` names files and tests that exist.
+#[test]
+fn the_lecture_table_is_true() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let text = std::fs::read_to_string(root.join("docs/from-the-lecture.md")).expect("the document");
+
+    let links: Vec<&str> = text.split("](").skip(1).filter_map(|s| s.split(')').next()).collect();
+    assert!(links.len() > 20, "the document has its table");
+    let broken: Vec<_> = links.iter().filter(|l| !root.join("docs").join(l).exists()).collect();
+    assert!(broken.is_empty(), "broken links: {broken:?}");
+
+    // Names of tests are code spans of three words and more.
+    let is_name = |s: &&str| s.matches('_').count() >= 2 && s.chars().all(|c| c.is_ascii_lowercase() || c == '_');
+    let mut sources = String::new();
+    let mut folders = vec![root.join("crates"), root.join("tests/tests")];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).expect("a folder of the repository").flatten() {
+            let path = entry.path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| e == "rs") {
+                sources += &std::fs::read_to_string(path).expect("a source file");
+            }
+        }
+    }
+    let unknown: Vec<_> =
+        text.split('`').skip(1).step_by(2).filter(is_name).filter(|n| !sources.contains(&format!("fn {n}("))).collect();
+    assert!(unknown.is_empty(), "tests that do not exist: {unknown:?}");
+}
