@@ -338,6 +338,64 @@ proptest! {
     }
 }
 
+/// Any number at all: of ordinary size, or any bit pattern.
+fn any_number() -> impl Strategy<Value = f32> {
+    let special = [0.0, -0.0, f32::NAN, f32::INFINITY, -f32::INFINITY, f32::MAX, f32::MIN_POSITIVE, 1e-45, 1.0];
+    prop_oneof![-10.0..10.0_f32, any::<u32>().prop_map(f32::from_bits), prop::sample::select(special.to_vec())]
+}
+
+/// What the constructors make of any numbers.
+fn any_shapes(x: &[f32; 12]) -> Vec<Shape<f32>> {
+    let v = |i: usize| Vec3::from_slice(&x[i..i + 3]);
+    let q = [x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9]];
+    let quadrics = [
+        Quadric::new(q),
+        Quadric::new(q).and_then(|q| q.with_clip(Aabb::new(v(9), v(6)))),
+        Quadric::cylinder(x[0], x[1], x[2]),
+        Quadric::cone(x[0], x[1], x[2]),
+        Quadric::ellipsoid(v(0)),
+        Quadric::paraboloid(x[0], x[1]),
+        Quadric::hyperboloid_one(x[0], x[1], x[2], x[3]),
+        Quadric::hyperboloid_two(x[0], x[1], x[2], x[3]),
+    ];
+    let shapes = [
+        Sphere::new(v(0), x[3]).map(Shape::from),
+        Plane::new(v(0), v(3)).map(Shape::from),
+        Disk::new(v(0), v(3), x[6], x[7]).map(Shape::from),
+        Polygon::new(vec![vec![v(0), v(3), v(6)]]).map(Shape::from),
+        Cuboid::new(v(0), v(3)).map(Shape::from),
+    ];
+    let solids = quadrics.iter().flatten().map(|q| Solid::new(*q).into()).collect::<Vec<_>>();
+    quadrics.iter().flatten().map(|q| Shape::from(*q)).chain(shapes.into_iter().flatten()).chain(solids).collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 4000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// No numbers make a panic or a hit that is no number.
+    #[test]
+    fn any_numbers_give_an_answer(x in prop::array::uniform12(any_number()), y in prop::array::uniform8(any_number())) {
+        let ray = Ray::<f32>::new(Vec3::new(y[0], y[1], y[2]), Vec3::new(y[3], y[4], y[5])).with_interval(y[6], y[7]);
+        for ray in [ray, ray.with_interval(0.0, f32::INFINITY)] {
+            for shape in any_shapes(&x) {
+                for hit in [shape.closest_hit(&ray), shape.closest_hit_fast(&ray)].into_iter().flatten() {
+                    prop_assert!(hit.t.is_finite() && ray.contains(hit.t), "{shape:?} {ray:?} {hit:?}");
+                    prop_assert!(hit.normal.is_none_or(|n| n.is_finite()), "{shape:?} {ray:?} {hit:?}");
+                    prop_assert!(hit.u.is_finite() && hit.v.is_finite(), "{shape:?} {ray:?} {hit:?}");
+                    let _ = shape.refine(ray.at(hit.t), hit.normal);
+                }
+                prop_assert_eq!(shape.any_hit(&ray), shape.closest_hit(&ray).is_some());
+                if let Ok(double) = shape.cast::<f64>() {
+                    let hit = double.closest_hit(&ray.to_f64());
+                    prop_assert!(hit.is_none_or(|h| h.t.is_finite()), "{double:?} {ray:?} {hit:?}");
+                }
+                let bounds = shape.bounds();
+                prop_assert!((0..3).all(|i| !bounds.min[i].is_nan() && !bounds.max[i].is_nan()), "{shape:?} {bounds:?}");
+            }
+        }
+    }
+}
+
 /// The shape `s` times as large, about the origin.
 fn scaled(shape: &Shape<f64>, s: f64) -> Shape<f64> {
     let quadric = |q: &Quadric<f64>| {

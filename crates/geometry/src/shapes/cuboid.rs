@@ -129,7 +129,7 @@ impl<R: Real> Cuboid<R> {
         };
         let (first, second) = [(1, 2), (0, 2), (0, 1)][axis];
         let normal = R::Vec3::default().with_axis(axis, outward);
-        SurfaceHit { t, u: coordinate(first), v: coordinate(second), normal: Some(normal) }
+        SurfaceHit::new(t, coordinate(first), coordinate(second), Some(normal))
     }
 
     /// Moves a point near a face onto it; see [`Primitive::refine`].

@@ -98,7 +98,7 @@ impl<R: Real> Primitive<R> for Disk<R> {
         let width = self.radius - self.inner_radius;
         let v = if width > R::ZERO { (l.length() - self.inner_radius) / width } else { R::ZERO };
         let v = v.max(R::ZERO).min(R::ONE);
-        Some(SurfaceHit { t, u: turn(l.dot(tangent), l.dot(bitangent)), v, normal: Some(self.plane.normal()) })
+        Some(SurfaceHit::new(t, turn(l.dot(tangent), l.dot(bitangent)), v, Some(self.plane.normal())))
     }
 
     fn any_hit(&self, ray: &Ray<R>) -> bool {

@@ -27,6 +27,14 @@ pub struct SurfaceHit<R: Real> {
     pub normal: Option<R::Vec3>,
 }
 
+impl<R: Real> SurfaceHit<R> {
+    /// A hit; surface parameters that are no numbers, because the hit point is out of range, become 0.
+    fn new(t: R, u: R, v: R, normal: Option<R::Vec3>) -> Self {
+        let number = |x: R| if x.is_finite() { x } else { R::ZERO };
+        Self { t, u: number(u), v: number(v), normal }
+    }
+}
+
 /// What every primitive answers, in the arithmetic of `R`.
 pub trait Primitive<R: Real> {
     /// A box that holds the primitive (infinite for unbounded ones). Conservative: no point of the surface, nor a

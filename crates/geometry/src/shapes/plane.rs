@@ -103,7 +103,7 @@ impl<R: Real> Primitive<R> for Plane<R> {
         let t = self.nearest(ray)?;
         let l = (ray.origin - self.point) + ray.direction * t;
         let (tangent, bitangent) = tangents::<R>(self.normal);
-        Some(SurfaceHit { t, u: l.dot(tangent), v: l.dot(bitangent), normal: Some(self.normal) })
+        Some(SurfaceHit::new(t, l.dot(tangent), l.dot(bitangent), Some(self.normal)))
     }
 
     fn any_hit(&self, ray: &Ray<R>) -> bool {

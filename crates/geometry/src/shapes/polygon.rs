@@ -177,7 +177,7 @@ impl<R: Real> Primitive<R> for Polygon<R> {
             let (low, high) = (self.bounds.min.axis(axis), self.bounds.max.axis(axis));
             ((p.axis(axis) - low) / (high - low)).max(R::ZERO).min(R::ONE)
         });
-        Some(SurfaceHit { t, u, v, normal: self.normal })
+        Some(SurfaceHit::new(t, u, v, self.normal))
     }
 
     fn any_hit(&self, ray: &Ray<R>) -> bool {

@@ -370,7 +370,7 @@ impl<R: Real> Quadric<R> {
         let p = local_point * self.size;
         let (low, height) = (self.bounds.min.y(), self.bounds.max.y() - self.bounds.min.y());
         let v = if height.is_finite() && height > R::ZERO { (p.y() - low) / height } else { p.y() };
-        SurfaceHit { t, u: longitude::<R>(p), v, normal }
+        SurfaceHit::new(t, longitude::<R>(p), v, normal)
     }
 
     /// The hit at a parameter of the local line.

@@ -98,7 +98,7 @@ impl<R: Real> Sphere<R> {
         let normal = unit::<R>((ray.origin - self.center) + ray.direction * t);
         let n = normal.unwrap_or_default();
         let latitude = n.y().to_f64().clamp(-1.0, 1.0).asin() / core::f64::consts::PI + 0.5;
-        SurfaceHit { t, u: longitude::<R>(n), v: R::from_f64(latitude), normal }
+        SurfaceHit::new(t, longitude::<R>(n), R::from_f64(latitude), normal)
     }
 }
 
