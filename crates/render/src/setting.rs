@@ -18,6 +18,8 @@ pub(crate) struct Setting {
     pub(crate) words: Vec<String>,
     /// The studio only fills up the file's own lights.
     pub(crate) dim: bool,
+    /// It is the built-in studio, for want of anything else.
+    pub(crate) studio: bool,
 }
 
 /// Chooses what surrounds the scene.
@@ -58,7 +60,8 @@ pub(crate) fn choose(scene: &SceneDesc, options: &StageOptions) -> Result<Settin
     };
     Ok(Setting {
         background: Backdrop::new(options.background, studio),
-        dim: studio.is_some_and(|s| s < 1.0),
+        dim: matches!(options.environment, EnvironmentChoice::Auto) && studio == Some(FILL),
+        studio: matches!(options.environment, EnvironmentChoice::Auto) && scene.environment.is_none(),
         environment,
         words: vec![format!("surroundings: {words}")],
     })

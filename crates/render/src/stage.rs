@@ -120,18 +120,20 @@ impl Stage {
         let reference = scene.settings.reference_conventions;
         let mut explain = Vec::new();
         let camera = choose_camera(&scene, &accel, options, &mut explain)?;
-        let Setting { environment, background, words, dim } = setting::choose(&scene, options)?;
+        let Setting { environment, background, words, dim, studio } = setting::choose(&scene, options)?;
         explain.extend(words);
 
         // What the scene calls for decides what is compiled.
         let mut plan = EffectPlan::default();
         survey::call_for_materials(&mut plan, &scene);
         survey::call_for_lights(&mut plan, &scene, environment.as_ref(), &explain_environment(dim));
-        let headlight = if reference {
-            None
-        } else {
-            survey::headlight(&scene, &accel, &camera, options.aspect, environment.is_some())
-        };
+        let lit = setting::has_lights(&scene);
+        let view = if reference { None } else { survey::view(&accel, &camera, options.aspect) };
+        let headlight = view
+            .filter(|v| v.indoors && !lit && environment.is_some())
+            .map(|v| survey::Headlight { position: camera.position(), distance: v.distance });
+        // A studio that hardly reaches a room would only be noise there.
+        let sample_environment = !(studio && headlight.is_some());
         if headlight.is_some() {
             let effects = EffectSet::SHADOWS | EffectSet::PUNCTUAL_LIGHTS | EffectSet::AMBIENT_OCCLUSION;
             plan.call(effects, "light at the camera");
@@ -140,6 +142,9 @@ impl Stage {
                  surroundings hardly reach what is seen"
                     .into(),
             );
+        } else if dim && view.is_some() {
+            plan.call(EffectSet::AMBIENT_OCCLUSION, "even light");
+            explain.push("light: a little even light was added for what surfaces send to each other".into());
         }
         plan.decide(&options.effects);
         let effects = plan.simulated();
@@ -191,10 +196,15 @@ impl Stage {
             punctual,
             area,
             environment: environment.filter(|e| effects.contains(EffectSet::ENVIRONMENT) && !e.is_black()),
+            sample_environment,
             ambient: if headlight.is_some() { survey::AMBIENT } else { Vec3::ZERO },
-            ambient_reach: headlight.as_ref().map_or(0.0, |h| 0.5 * h.distance),
+            ambient_reach: view.map_or(0.0, |v| 0.5 * v.distance),
         };
-        Ok(Self { world, accel, materials, flags, lights, camera, background, reference, plan, explain })
+        let mut stage = Self { world, accel, materials, flags, lights, camera, background, reference, plan, explain };
+        if dim && view.is_some() {
+            stage.lights.ambient = survey::even_light(&stage, options.aspect);
+        }
+        Ok(stage)
     }
 
     /// Which effects the scene calls for, by what, and which are simulated.

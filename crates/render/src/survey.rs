@@ -1,17 +1,23 @@
 //! Looking over a scene: which effects it calls for, and whether it needs a light at the camera.
 
+use firsthit_geometry::Ray;
+use firsthit_geometry::clip::ClipRegion;
 use firsthit_import::SceneDesc;
 use firsthit_import::scene::{AlphaMode, LightKind, MaterialModel, PbrMaterial, SurfaceDesc};
 use glam::{DVec3, Vec3};
 
 use crate::camera::Camera;
-use crate::integrator::ROUGHEST_FOLLOWED;
+use crate::camera::Cone;
+use crate::integrator::whitted::{Limits, Seen};
+use crate::integrator::{ROUGHEST_FOLLOWED, Tracer};
+use crate::light::environment::luminance;
 use crate::light::punctual::PunctualLight;
+use crate::material::lobes::LobeKind;
 use crate::sampler::{Dimension, PixelSampler};
-use crate::{EffectPlan, EffectSet, Environment, setting, warp};
+use crate::{EffectPlan, EffectSet, Environment, Stage, warp};
 
 /// Even light in rooms that are lit from the camera, as radiance.
-pub(crate) const AMBIENT: Vec3 = Vec3::splat(0.12);
+pub(crate) const AMBIENT: Vec3 = Vec3::splat(0.3);
 
 /// At most so many materials are named for each effect.
 const NAMED: usize = 6;
@@ -148,59 +154,86 @@ pub(crate) fn call_for_lights(plan: &mut EffectPlan, scene: &SceneDesc, environm
 /// A light at the camera.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Headlight {
-    position: DVec3,
+    pub(crate) position: DVec3,
     /// How far away half of what is seen is.
     pub(crate) distance: f64,
 }
 
 impl Headlight {
     pub(crate) fn light(&self) -> PunctualLight {
-        PunctualLight::Headlight { position: self.position, irradiance: 2.5, distance: self.distance }
+        PunctualLight::Headlight { position: self.position, irradiance: 3.0, distance: self.distance }
     }
 }
 
-/// A light at the camera, if nothing lights the scene, or only surroundings that hardly reach what is seen.
-pub(crate) fn headlight(
-    scene: &SceneDesc,
-    accel: &firsthit_accel::Scene,
-    camera: &Camera,
-    aspect: f64,
-    surrounded: bool,
-) -> Option<Headlight> {
-    /// With less of its hemisphere open to the surroundings a typical visible point counts as indoors.
-    const INDOORS: f64 = 0.2;
-    const ROWS: u32 = 18;
-    if setting::has_lights(scene) || !surrounded {
-        return None;
-    }
+/// What the camera sees, looked over by a few rays.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct View {
+    /// How far away half of what is seen is.
+    pub(crate) distance: f64,
+    /// The surroundings hardly reach what is seen.
+    pub(crate) indoors: bool,
+}
+
+const ROWS: u32 = 18;
+
+/// The rays that look a view over.
+fn looks(camera: &Camera, aspect: f64) -> impl Iterator<Item = ((u32, u32), Ray<f64>)> {
     let columns = ((f64::from(ROWS) * aspect) as u32).clamp(1, 64);
     let rays = camera.on_film(columns, ROWS);
-    let (mut distances, mut open) = (Vec::new(), 0.0);
-    for y in 0..ROWS {
-        for x in 0..columns {
-            let ray = rays.ray([f64::from(x) + 0.5, f64::from(y) + 0.5]);
-            let Some(hit) = accel.closest_hit(&ray) else { continue };
-            distances.push(hit.t * ray.direction.length());
-            let point = accel.surface_point(&ray, &hit);
-            let normal = if point.normal.dot(ray.direction) > 0.0 { -point.normal } else { point.normal };
-            let (tangent, bitangent) = warp::frame(normal.as_vec3());
-            let sampler = PixelSampler::new(0, (x, y), 0);
-            const LOOKS: u32 = 4;
-            for look in 0..LOOKS {
-                let w = warp::cosine_hemisphere(sampler.branch(look).get2(Dimension::Direction(0)));
-                let d = (tangent * w.x + bitangent * w.y).as_dvec3() + normal * f64::from(w.z);
-                let away = firsthit_geometry::Ray::new(point.spawn(d), d);
-                if !accel.any_hit_filtered(&away, Some(hit.id), |_| true) {
-                    open += 1.0 / f64::from(LOOKS);
-                }
+    (0..ROWS * columns).map(move |i| {
+        let (x, y) = (i % columns, i / columns);
+        ((x, y), rays.ray([f64::from(x) + 0.5, f64::from(y) + 0.5]))
+    })
+}
+
+/// Looks a view over; `None` where there is hardly anything to see.
+pub(crate) fn view(accel: &firsthit_accel::Scene, camera: &Camera, aspect: f64) -> Option<View> {
+    /// With less of its hemisphere open to the surroundings a typical visible point counts as indoors.
+    const INDOORS: f64 = 0.2;
+    const DIRECTIONS: u32 = 4;
+    let (mut distances, mut open, mut all) = (Vec::new(), 0.0, 0);
+    for (pixel, ray) in looks(camera, aspect) {
+        all += 1;
+        let Some(hit) = accel.closest_hit(&ray) else { continue };
+        distances.push(hit.t * ray.direction.length());
+        let point = accel.surface_point(&ray, &hit);
+        let normal = if point.normal.dot(ray.direction) > 0.0 { -point.normal } else { point.normal };
+        let (tangent, bitangent) = warp::frame(normal.as_vec3());
+        let sampler = PixelSampler::new(0, pixel, 0);
+        for branch in 0..DIRECTIONS {
+            let w = warp::cosine_hemisphere(sampler.branch(branch).get2(Dimension::Direction(0)));
+            let d = (tangent * w.x + bitangent * w.y).as_dvec3() + normal * f64::from(w.z);
+            let away = Ray::new(point.spawn(d), d);
+            if !accel.any_hit_filtered(&away, Some(hit.id), |_| true) {
+                open += 1.0 / f64::from(DIRECTIONS);
             }
         }
     }
-    // A few pixels of something are not an indoor scene.
-    if (distances.len() as u32) < columns * ROWS / 2 || open >= INDOORS * distances.len() as f64 {
-        return None;
-    }
+    let indoors = 2 * distances.len() >= all && open < INDOORS * distances.len() as f64;
     distances.sort_unstable_by(f64::total_cmp);
-    let distance = distances[distances.len() / 2];
-    Some(Headlight { position: camera.position(), distance })
+    Some(View { distance: *distances.get(distances.len() / 2)?, indoors })
+}
+
+/// Even light for a stage with lights of its own: a quarter of the mean radiance of what its lights reach, in place of
+/// the light that surfaces send to each other (the ambient term of progressive radiosity, Cohen et al. 1988, with a
+/// guess instead of a sum).
+pub(crate) fn even_light(stage: &Stage, aspect: f64) -> Vec3 {
+    let clip = ClipRegion::default();
+    let mut tracer = Tracer::<true, true>::new(stage, &clip);
+    let limits = Limits { bounces: 1, follow: LobeKind::empty() };
+    let cone = Cone { width: 0.0, spread: 0.0 };
+    let (mut sum, mut seen) = (0.0, 0);
+    for (pixel, ray) in looks(&stage.camera, aspect) {
+        let sampler = PixelSampler::new(0, pixel, 0);
+        let Seen { color, first: Some(_), .. } = tracer.radiance(ray, cone, [0.5; 2], sampler, limits) else {
+            continue;
+        };
+        let light = luminance(color);
+        if light.is_finite() {
+            // What glows or glares must not count for everything.
+            sum += light.min(1.0);
+            seen += 1;
+        }
+    }
+    Vec3::splat(if seen > 0 { 0.25 * sum / seen as f32 } else { 0.0 })
 }

@@ -1,10 +1,13 @@
 //! The light that reaches one point from all lights.
 
+use std::f32::consts::FRAC_1_PI;
+
 use glam::{DVec3, Vec3};
 
 use super::Tracer;
 use crate::RayKind;
-use crate::light::{LightSample, power_heuristic};
+use crate::light::environment::luminance;
+use crate::light::{LightEnd, LightSample, power_heuristic};
 use crate::material::Bsdf;
 use crate::material::lobes::{Lobe, LobeKind};
 use crate::sampler::{Dimension, PixelSampler};
@@ -96,9 +99,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
                 total += self.arriving(lit, &sample, RayKind::ShadowArea);
             }
         }
-        if let Some(sample) = self.environment_sample(lit, numbers(ENVIRONMENT).1) {
-            total += self.arriving(lit, &sample, RayKind::ShadowEnvironment);
-        }
+        total += self.surroundings(lit);
         total
     }
 
@@ -111,20 +112,63 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
         light * self.transmittance(kind, origin, sample, lit.surface.id)
     }
 
-    /// Light from around. What is the same from everywhere is best sampled by the cosine.
-    fn environment_sample(&self, lit: &Lit<'_>, u: [f32; 2]) -> Option<LightSample> {
-        let environment = self.stage.lights.environment.as_ref()?;
-        let end = crate::light::LightEnd::Infinity;
+    /// Light from around. What is the same from everywhere is best sampled by the cosine. A map is sampled both ways
+    /// by several candidates, of which one is chosen in proportion to the light that it would send if nothing were in
+    /// the way: Talbot, Cline and Egbert, "Importance Resampling for Global Illumination" (2005). So no shadow ray is
+    /// lost on what lies below the horizon or reflects little.
+    fn surroundings(&mut self, lit: &Lit<'_>) -> Vec3 {
+        /// Half of them drawn from the map, half by the cosine.
+        const CANDIDATES: u32 = 8;
+        let stage = self.stage;
+        let Some(environment) = stage.lights.environment.as_ref().filter(|_| stage.lights.sample_environment) else {
+            return Vec3::ZERO;
+        };
+        let towards = |direction, radiance, pdf| LightSample {
+            direction,
+            radiance,
+            pdf: Some(pdf),
+            end: LightEnd::Infinity,
+            target: None,
+        };
         if environment.is_constant() {
-            let w = warp::cosine_hemisphere(u);
-            let direction = lit.bsdf.to_world(w);
-            let pdf = self.stage.environment_pdf(direction, lit.bsdf.normal);
-            let radiance = environment.radiance(direction) / pdf;
-            return (pdf > 0.0).then_some(LightSample { direction, radiance, pdf: Some(pdf), end, target: None });
+            let u = lit.sampler.branch(ENVIRONMENT).get2(Dimension::LightPosition(lit.bounce));
+            let direction = lit.bsdf.to_world(warp::cosine_hemisphere(u));
+            let pdf = stage.environment_pdf(direction, lit.bsdf.normal);
+            if !(pdf > 0.0) {
+                return Vec3::ZERO;
+            }
+            let sample = towards(direction, environment.radiance(direction) / pdf, pdf);
+            return self.arriving(lit, &sample, RayKind::ShadowEnvironment);
         }
-        let sample = environment.sample(u)?;
-        let radiance = sample.radiance / sample.pdf;
-        Some(LightSample { direction: sample.direction, radiance, pdf: Some(sample.pdf), end, target: None })
+        let (mut chosen, mut sum) = (None, 0.0);
+        for i in 0..CANDIDATES {
+            let sampler = lit.sampler.branch(ENVIRONMENT + i);
+            let u = sampler.get2(Dimension::LightPosition(lit.bounce));
+            let (direction, radiance) = if i % 2 == 0 {
+                let Some(sample) = environment.sample(u) else { continue };
+                (sample.direction, sample.radiance)
+            } else {
+                let direction = lit.bsdf.to_world(warp::cosine_hemisphere(u));
+                (direction, environment.radiance(direction))
+            };
+            let pdf = environment.pdf(direction);
+            let cosine = direction.dot(lit.bsdf.normal).max(0.0) * FRAC_1_PI;
+            let sample = towards(direction, radiance, pdf);
+            let light = lit.scattered(&sample) * radiance;
+            let strength = luminance(light);
+            let weight = strength / (0.5 * (pdf + cosine));
+            if !(weight > 0.0 && weight.is_finite()) {
+                continue;
+            }
+            sum += weight;
+            if sampler.get1(Dimension::LightChoice(lit.bounce)) * sum < weight {
+                chosen = Some((sample, light / strength));
+            }
+        }
+        let Some((sample, color)) = chosen else { return Vec3::ZERO };
+        let origin = lit.origin(&sample, !stage.reference);
+        let arrives = self.transmittance(RayKind::ShadowEnvironment, origin, &sample, lit.surface.id);
+        color * arrives * (sum / CANDIDATES as f32)
     }
 }
 
@@ -132,7 +176,8 @@ impl crate::Stage {
     /// Density with which direct light chooses a direction of the environment, at a point with this shading normal.
     pub(super) fn environment_pdf(&self, direction: Vec3, normal: Vec3) -> f32 {
         match &self.lights.environment {
-            Some(e) if e.is_constant() => direction.dot(normal).max(0.0) * std::f32::consts::FRAC_1_PI,
+            _ if !self.lights.sample_environment => 0.0,
+            Some(e) if e.is_constant() => direction.dot(normal).max(0.0) * FRAC_1_PI,
             Some(e) => e.pdf(direction),
             None => 0.0,
         }

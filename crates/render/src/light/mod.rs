@@ -39,7 +39,9 @@ pub(crate) struct Lights {
     pub(crate) area: area::AreaLights,
     /// Light from around; `None`: black.
     pub(crate) environment: Option<environment::Environment>,
-    /// Light that is everywhere in rooms lit from the camera: radiance.
+    /// Whether direct light comes from it (else it is only seen and mirrored).
+    pub(crate) sample_environment: bool,
+    /// Even light, in place of what surfaces send to each other: radiance.
     pub(crate) ambient: Vec3,
     /// How near things must be to take that light away.
     pub(crate) ambient_reach: f64,

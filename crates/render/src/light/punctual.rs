@@ -106,7 +106,7 @@ impl PunctualLight {
                 let to = *position - point;
                 let d = to.length();
                 let x = d / distance;
-                let value = Vec3::splat(irradiance * (2.0 / (1.0 + x * x)) as f32);
+                let value = Vec3::splat(irradiance * (2.0 / (1.0 + x)) as f32);
                 ((to / d).as_vec3(), value, LightEnd::At(*position))
             }
         };
