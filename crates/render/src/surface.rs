@@ -126,7 +126,7 @@ impl World {
             // Vertex normals that disagree with the winding are turned with it.
             let n = if n.dot(geometric) < 0.0 { -n } else { n };
             surface.smooth = n.try_normalize().unwrap_or(geometric);
-            surface.lift = surface.to_smooth_surface();
+            surface.lift = surface.smooth_offset();
         }
         surface
     }
@@ -155,7 +155,7 @@ pub(crate) struct Surface<'a> {
     pub(crate) geometric: Vec3,
     /// Interpolated normal on the viewer's side.
     pub(crate) smooth: Vec3,
-    /// From the point to the curved surface that the vertex normals mean: see [`Surface::to_smooth_surface`].
+    /// From the point to the curved surface that the vertex normals mean: see [`Surface::smooth_offset`].
     pub(crate) lift: DVec3,
     /// Width of the cone of view here, world units.
     width: f32,
@@ -230,7 +230,7 @@ impl Surface<'_> {
     /// Seen from the light, a coarse mesh with smooth normals shadows itself along its edges. Shadow rays therefore
     /// start on the curved surface that the normals mean: Hanika, "Hacking the Shadow Terminator" (Ray Tracing Gems
     /// II, chapter 4).
-    fn to_smooth_surface(&self) -> DVec3 {
+    fn smooth_offset(&self) -> DVec3 {
         let Part::Triangle { mesh, corners, weights } = self.part else { return DVec3::ZERO };
         let point: Vec3 = (0..3).map(|i| mesh.positions[corners[i]] * weights[i]).sum();
         let outward = self.instance.normals * (0..3).map(|i| mesh.normals[corners[i]] * weights[i]).sum::<Vec3>();
@@ -274,7 +274,7 @@ impl Surface<'_> {
     }
 
     /// A normal from a normal map, in the world and on the viewer's side.
-    pub(crate) fn from_tangent_space(&self, n: Vec3, set: usize) -> Option<Vec3> {
+    pub(crate) fn mapped_normal(&self, n: Vec3, set: usize) -> Option<Vec3> {
         let outward = if self.front { self.smooth } else { -self.smooth };
         let (tangent, bitangent) = match self.part {
             Part::Triangle { mesh, corners, weights } if !mesh.tangents.is_empty() => {

@@ -36,7 +36,7 @@ pub(super) struct Lit<'a> {
 impl Lit<'_> {
     /// f |cos| towards a light, each lobe weighted against what following it would find.
     fn scattered(&self, sample: &LightSample) -> Vec3 {
-        let (wo, wi) = (self.bsdf.to_local(self.surface.wo), self.bsdf.to_local(sample.direction));
+        let (wo, wi) = (self.bsdf.local(self.surface.wo), self.bsdf.local(sample.direction));
         let before = sample.direction.dot(self.surface.smooth) > 0.0;
         let behind = sample.direction.dot(self.surface.geometric) < 0.0;
         let mut total = Vec3::ZERO;
@@ -132,7 +132,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
         };
         if environment.is_constant() {
             let u = lit.sampler.branch(ENVIRONMENT).get2(Dimension::LightPosition(lit.bounce));
-            let direction = lit.bsdf.to_world(warp::cosine_hemisphere(u));
+            let direction = lit.bsdf.world(warp::cosine_hemisphere(u));
             let pdf = stage.environment_pdf(direction, lit.bsdf.normal);
             if !(pdf > 0.0) {
                 return Vec3::ZERO;
@@ -148,7 +148,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
                 let Some(sample) = environment.sample(u) else { continue };
                 (sample.direction, sample.radiance)
             } else {
-                let direction = lit.bsdf.to_world(warp::cosine_hemisphere(u));
+                let direction = lit.bsdf.world(warp::cosine_hemisphere(u));
                 (direction, environment.radiance(direction))
             };
             let pdf = environment.pdf(direction);

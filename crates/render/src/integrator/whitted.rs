@@ -240,7 +240,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
         pending: &mut Vec<Pending>,
     ) {
         let bsdf = &shading.bsdf;
-        let wo = bsdf.to_local(surface.wo);
+        let wo = bsdf.local(surface.wo);
         let strength = |lobe: &Lobe| (path.throughput * lobe.albedo(wo)).max_element();
         let lobes = || bsdf.lobes().iter().enumerate().filter(|(i, _)| followed[*i]);
         if path.bounce < SPLITS {
@@ -279,7 +279,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
                 left -= strength(lobe);
                 left < 0.0
             })
-            .or_else(|| lobes().last())
+            .or_else(|| lobes().next_back())
         else {
             return;
         };
@@ -303,7 +303,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
         t: f64,
         pending: &mut Vec<Pending>,
     ) {
-        let direction = shading.bsdf.to_world(sample.wi).as_dvec3().normalize();
+        let direction = shading.bsdf.world(sample.wi).as_dvec3().normalize();
         let through = lobe.kind() == LobeKind::TRANSMISSION;
         // A shading normal may send a reflection below the surface, or a refraction above it.
         let side = direction.dot(surface.geometric.as_dvec3());

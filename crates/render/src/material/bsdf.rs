@@ -37,11 +37,13 @@ impl Bsdf {
         &self.lobes[..self.count]
     }
 
-    pub(crate) fn to_local(&self, w: Vec3) -> Vec3 {
+    /// A world direction in the frame of the lobes.
+    pub(crate) fn local(&self, w: Vec3) -> Vec3 {
         Vec3::new(w.dot(self.x), w.dot(self.y), w.dot(self.normal))
     }
 
-    pub(crate) fn to_world(&self, w: Vec3) -> Vec3 {
+    /// A direction of the lobes' frame in the world.
+    pub(crate) fn world(&self, w: Vec3) -> Vec3 {
         self.x * w.x + self.y * w.y + self.normal * w.z
     }
 }

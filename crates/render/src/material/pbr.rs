@@ -238,7 +238,7 @@ impl Pbr {
             let texel = t.color(surface.uv(t.uv_set()), surface.footprint(t.uv_set()));
             let n = (texel.xyz() * 2.0 - 1.0) * Vec3::new(self.normal_scale, self.normal_scale, 1.0);
             if n.is_finite() && n.xy() != glam::Vec2::ZERO {
-                normal = surface.from_tangent_space(n, t.uv_set());
+                normal = surface.mapped_normal(n, t.uv_set());
             }
         }
         if let Some(t) = &self.bump_texture {
