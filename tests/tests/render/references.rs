@@ -17,6 +17,9 @@ use glam::Vec3;
 
 const SIDE: usize = 256;
 const BLOCK: usize = 8;
+/// Near the silhouette of a glass ball a share T of the light gets in, and each time a share T of it gets out again:
+/// n bounces lose T (1 - T)^n of it, at most 1 / (e n).
+const END: u32 = 1000;
 
 fn folder(name: &str) -> PathBuf {
     let base = std::env::var_os("FIRSTHIT_REFERENCES")
@@ -42,15 +45,14 @@ fn reference(name: &str) -> Vec<Vec3> {
     image.layer_data.channel_data.pixels
 }
 
-/// The scene as its file says. Near the silhouette of a glass ball, light is reflected inside dozens of times: 4096
-/// bounces are as good as no end.
+/// The scene as its file says; of paths without end, `END` bounces.
 fn picture(name: &str, spp: u32) -> Vec<Vec3> {
     let imported =
         firsthit_import::open(folder(name).join("scene.json"), &firsthit_import::Options::default()).unwrap();
     let settings = &imported.scene.settings;
     assert!(settings.reference_conventions);
     assert_eq!(settings.resolution, Some((SIDE as u32, SIDE as u32)));
-    let bounces = settings.max_path_edges.map_or(4096, |edges| edges.saturating_sub(1).min(4096));
+    let bounces = settings.max_path_edges.map_or(END, |edges| edges.saturating_sub(1).min(END));
     let scene = Arc::new(imported.scene);
     let options = StageOptions { aspect: 1.0, ..StageOptions::default() };
     let stage = super::common::stage(&scene, &options);
@@ -90,8 +92,8 @@ fn assert_block(name: &str, at: usize, (ours, deviation): (Vec3, Vec3), (theirs,
 
 #[test]
 fn in_a_white_furnace_glass_vanishes() {
-    for (i, p) in picture("furnace_glass", 16).iter().enumerate() {
-        assert!((*p - Vec3::ONE).abs().max_element() < 2e-5, "pixel {i}: {p}");
+    for (i, p) in picture("furnace_glass", 4).iter().enumerate() {
+        assert!((*p - Vec3::ONE).abs().max_element() < 4e-4, "pixel {i}: {p}");
     }
 }
 

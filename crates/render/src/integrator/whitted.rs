@@ -337,7 +337,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
             absorption,
             straight: path.straight && unbent,
             chosen: shared.map(|pdf| Chosen { pdf, from: surface.point.position, normal: shading.bsdf.normal }),
-            bright: if bounce <= ROULETTE { throughput.max_element() } else { path.bright },
+            bright: if bounce <= ROULETTE { throughput.max_element() } else { path.bright * lobe.scale() },
         });
     }
 }

@@ -223,7 +223,12 @@ impl Material {
                 let fresnel = Fresnel::Dielectric { eta };
                 let bsdf = Bsdf::new(self.bent(surface))
                     .with(Lobe::SpecularReflection(SpecularReflection { fresnel }))
-                    .with(Lobe::SpecularTransmission(SpecularTransmission { eta, fresnel, tint: self.scaling(eta) }));
+                    .with(Lobe::SpecularTransmission(SpecularTransmission {
+                        eta,
+                        fresnel,
+                        tint: Vec3::ONE,
+                        scale: self.scaling(eta),
+                    }));
                 (bsdf, Vec3::ONE)
             }
             Model::RoughMirror { alpha, reflectance } => {
@@ -234,7 +239,7 @@ impl Material {
             Model::RoughGlass { alpha } => {
                 let eta = self.eta(surface);
                 let (alpha, fresnel) = (*alpha, Fresnel::Dielectric { eta });
-                let transmission = GgxTransmission { alpha, eta, fresnel, tint: self.scaling(eta) };
+                let transmission = GgxTransmission { alpha, eta, fresnel, tint: Vec3::ONE, scale: self.scaling(eta) };
                 let bsdf = Bsdf::new(self.bent(surface))
                     .with(Lobe::GgxReflection(GgxReflection { alpha, fresnel, masking: Masking::Separate }))
                     .with(Lobe::GgxTransmission(transmission));
@@ -256,7 +261,7 @@ impl Material {
 
     /// Radiance changes with the square of the index. Between things that light enters and leaves again this cancels.
     /// Where shadow rays pass solids unbent, and therefore unscaled, it has to be left out for both.
-    fn scaling(&self, eta: f32) -> Vec3 {
-        if self.conventions.reference { Vec3::splat(1.0 / (eta * eta)) } else { Vec3::ONE }
+    fn scaling(&self, eta: f32) -> f32 {
+        if self.conventions.reference { 1.0 / (eta * eta) } else { 1.0 }
     }
 }

@@ -215,12 +215,12 @@ impl Pbr {
             bsdf = bsdf.with(if (eta - 1.0).abs() > 1e-3 {
                 // KHR_materials_transmission leaves open how the index changes roughness; microfacets say it.
                 if smooth {
-                    Lobe::SpecularTransmission(SpecularTransmission { eta, fresnel, tint })
+                    Lobe::SpecularTransmission(SpecularTransmission { eta, fresnel, tint, scale: 1.0 })
                 } else {
-                    Lobe::GgxTransmission(GgxTransmission { alpha, eta, fresnel, tint })
+                    Lobe::GgxTransmission(GgxTransmission { alpha, eta, fresnel, tint, scale: 1.0 })
                 }
             } else if smooth {
-                Lobe::SpecularTransmission(SpecularTransmission { eta: 1.0, fresnel, tint })
+                Lobe::SpecularTransmission(SpecularTransmission { eta: 1.0, fresnel, tint, scale: 1.0 })
             } else {
                 Lobe::ThinTransmission(ThinTransmission { alpha, fresnel, tint })
             });

@@ -101,6 +101,15 @@ impl Lobe {
         each!(self, lobe => lobe.sample(wo, u))
     }
 
+    /// By how much radiance changes on the way through, beside what is lost: see `SpecularTransmission::scale`.
+    pub(crate) fn scale(&self) -> f32 {
+        match self {
+            Self::SpecularTransmission(lobe) => lobe.scale,
+            Self::GgxTransmission(lobe) => lobe.scale,
+            _ => 1.0,
+        }
+    }
+
     /// About how much of the light from everywhere goes to `wo`: for choosing between lobes.
     pub(crate) fn albedo(&self, wo: Vec3) -> Vec3 {
         each!(self, lobe => lobe.albedo(wo))

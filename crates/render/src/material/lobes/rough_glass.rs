@@ -17,6 +17,8 @@ pub(crate) struct GgxTransmission {
     pub(crate) fresnel: Fresnel,
     /// Multiplies what goes through.
     pub(crate) tint: Vec3,
+    /// Change of radiance by the change of index: 1 / eta^2, or 1 where that is left out.
+    pub(crate) scale: f32,
 }
 
 impl GgxTransmission {
@@ -44,7 +46,7 @@ impl GgxTransmission {
         let Some(h) = self.facet(wo, wi) else { return Vec3::ZERO };
         let cos = wo.dot(h);
         let g = g2(wo, wi, self.alpha, Masking::Separate);
-        self.passed(cos) * (density(h, self.alpha) * g * cos / wo.z * self.jacobian(wo, wi, h))
+        self.passed(cos) * (self.scale * density(h, self.alpha) * g * cos / wo.z * self.jacobian(wo, wi, h))
     }
 
     pub(super) fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
@@ -60,7 +62,7 @@ impl GgxTransmission {
         if !(cos > 0.0 && wo.z > 0.0 && wi.z < 0.0) {
             return None;
         }
-        let weight = self.passed(cos) * (g2(wo, wi, self.alpha, Masking::Separate) / g1(wo, self.alpha));
+        let weight = self.passed(cos) * (self.scale * g2(wo, wi, self.alpha, Masking::Separate) / g1(wo, self.alpha));
         Some(LobeSample { wi, weight, pdf: Some(visible_pdf(wo, h, self.alpha) * self.jacobian(wo, wi, h)) })
     }
 

@@ -39,6 +39,8 @@ pub(crate) struct SpecularTransmission {
     pub(crate) fresnel: Fresnel,
     /// Multiplies what goes through.
     pub(crate) tint: Vec3,
+    /// Change of radiance by the change of index: 1 / eta^2, or 1 where that is left out.
+    pub(crate) scale: f32,
 }
 
 impl SpecularTransmission {
@@ -53,7 +55,7 @@ impl SpecularTransmission {
     pub(super) fn sample(&self, wo: Vec3, _: [f32; 2]) -> Option<LobeSample> {
         let cos_t = refracted_cos(wo.z, self.eta)?;
         let wi = Vec3::new(-wo.x / self.eta, -wo.y / self.eta, -cos_t);
-        Some(LobeSample { wi, weight: self.albedo(wo), pdf: None })
+        Some(LobeSample { wi, weight: self.albedo(wo) * self.scale, pdf: None })
     }
 
     pub(super) fn albedo(&self, wo: Vec3) -> Vec3 {
@@ -68,7 +70,7 @@ mod tests {
     #[test]
     fn refraction_obeys_snells_law_and_stops_at_the_critical_angle() {
         for eta in [1.5f32, 1.0 / 1.5] {
-            let lobe = SpecularTransmission { eta, fresnel: Fresnel::Dielectric { eta }, tint: Vec3::ONE };
+            let lobe = SpecularTransmission { eta, fresnel: Fresnel::Dielectric { eta }, tint: Vec3::ONE, scale: 1.0 };
             for degrees in 0..90 {
                 let theta = (degrees as f32).to_radians();
                 let wo = Vec3::new(theta.sin(), 0.0, theta.cos());
@@ -88,7 +90,7 @@ mod tests {
         let fresnel = Fresnel::Dielectric { eta: 1.5 };
         let wo = Vec3::new(0.8, 0.0, 0.6);
         let r = SpecularReflection { fresnel }.sample(wo, [0.0; 2]).unwrap();
-        let t = SpecularTransmission { eta: 1.5, fresnel, tint: Vec3::ONE }.sample(wo, [0.0; 2]).unwrap();
+        let t = SpecularTransmission { eta: 1.5, fresnel, tint: Vec3::ONE, scale: 1.0 }.sample(wo, [0.0; 2]).unwrap();
         assert!((r.weight + t.weight - Vec3::ONE).abs().max_element() < 1e-6);
         assert_eq!(r.wi, Vec3::new(-0.8, 0.0, 0.6));
     }

@@ -26,7 +26,7 @@ fn lobes() -> Vec<(String, Lobe)> {
         }
         for eta in [1.5f32, 1.0 / 1.5] {
             let fresnel = Fresnel::Dielectric { eta };
-            let lobe = GgxTransmission { alpha, eta, fresnel, tint: Vec3::ONE };
+            let lobe = GgxTransmission { alpha, eta, fresnel, tint: Vec3::ONE, scale: 1.0 };
             all.push((format!("rough glass {alpha} {eta}"), Lobe::GgxTransmission(lobe)));
         }
         let lobe = ThinTransmission { alpha, fresnel: schlick(), tint: Vec3::new(1.0, 0.5, 0.2) };
@@ -198,13 +198,19 @@ fn reflection_and_thin_transmission_are_reciprocal() {
 #[test]
 fn refraction_is_reciprocal_up_to_the_scaling_of_radiance() {
     let (eta, alpha) = (1.5f32, 0.3);
-    let enter =
-        Lobe::GgxTransmission(GgxTransmission { alpha, eta, fresnel: Fresnel::Dielectric { eta }, tint: Vec3::ONE });
+    let enter = Lobe::GgxTransmission(GgxTransmission {
+        alpha,
+        eta,
+        fresnel: Fresnel::Dielectric { eta },
+        tint: Vec3::ONE,
+        scale: 1.0,
+    });
     let leave = Lobe::GgxTransmission(GgxTransmission {
         alpha,
         eta: 1.0 / eta,
         fresnel: Fresnel::Dielectric { eta: 1.0 / eta },
         tint: Vec3::ONE,
+        scale: 1.0,
     });
     let mut random = Random(9);
     let mut compared = 0;
