@@ -4,9 +4,22 @@ use firsthit_geometry::{
     Ray,
     triangle::{self, Shear},
 };
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::local::LocalRay;
+
+// Written out: `map` on arrays is not always inlined.
+
+#[inline(always)]
+fn relative(v: &[Vec3; 3], origin: Vec3) -> [Vec3; 3] {
+    [v[0] - origin, v[1] - origin, v[2] - origin]
+}
+
+/// The vertices in double precision, exactly.
+#[inline(always)]
+pub(crate) fn double(v: &[Vec3; 3]) -> [DVec3; 3] {
+    [v[0].as_dvec3(), v[1].as_dvec3(), v[2].as_dvec3()]
+}
 
 /// A triangle test. `t` is local and counted from the ray's true origin.
 pub(crate) trait Kernel {
@@ -46,10 +59,15 @@ impl Kernel for Robust {
 
     #[inline(always)]
     fn test((): &(), ray: &LocalRay, vertices: &[Vec3; 3]) -> Option<(f64, f32, f32)> {
-        let w = ray.shear.weights(vertices.map(|v| v - ray.origin32))?;
-        let t = triangle::plane_parameter(vertices.map(|v| v.as_dvec3()), ray.origin, ray.direction)?;
-        Some((t, w.u, w.v))
+        let w = ray.shear.weights(relative(vertices, ray.origin32))?;
+        Some((plane(vertices, ray)?, w.u, w.v))
     }
+}
+
+/// Apart from the loop, since few triangles come so far.
+#[inline(never)]
+fn plane(vertices: &[Vec3; 3], ray: &LocalRay) -> Option<f64> {
+    triangle::plane_parameter(double(vertices), ray.origin, ray.direction)
 }
 
 /// Tier `Double`: the same in `f64`, with the unrounded ray.
@@ -65,9 +83,8 @@ impl Kernel for Double {
 
     #[inline(always)]
     fn test(setup: &Shear<f64>, ray: &LocalRay, vertices: &[Vec3; 3]) -> Option<(f64, f32, f32)> {
-        let vertices = vertices.map(|v| v.as_dvec3());
-        let w = setup.weights(vertices.map(|v| v - ray.origin))?;
-        let t = triangle::plane_parameter(vertices, ray.origin, ray.direction)?;
-        Some((t, w.u as f32, w.v as f32))
+        let [a, b, c] = double(vertices);
+        let w = setup.weights([a - ray.origin, b - ray.origin, c - ray.origin])?;
+        Some((plane(vertices, ray)?, w.u as f32, w.v as f32))
     }
 }

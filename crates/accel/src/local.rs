@@ -38,6 +38,21 @@ fn half_size(bounds: &Aabb<f64>) -> f64 {
     bounds.extent().max_element() * 0.5
 }
 
+/// Where an object is and how large: a cube around its box.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Extent {
+    center: DVec3,
+    /// Half the longest side of the box.
+    half: f64,
+}
+
+impl Extent {
+    /// A point at the origin for an object without a box.
+    pub(crate) fn new(bounds: &Aabb<f64>) -> Self {
+        if bounds.is_empty() { Self::default() } else { Self { center: bounds.center(), half: half_size(bounds) } }
+    }
+}
+
 /// A ray in an object's normalised space. Its parameter is `world t * t_scale`.
 #[derive(Clone, Debug)]
 pub(crate) struct LocalRay {
@@ -49,7 +64,7 @@ pub(crate) struct LocalRay {
     pub(crate) t_scale: f64,
     /// The moved origin is `origin + shift * direction`, and its parameter counts from there.
     pub(crate) shift: f64,
-    moved: DVec3,
+    exact_slabs: Slabs<f64>,
     reach: DVec3,
     /// The moved origin in single precision.
     pub(crate) origin32: Vec3,
@@ -62,9 +77,10 @@ pub(crate) struct LocalRay {
 }
 
 impl LocalRay {
-    /// Enters the object whose primitives lie within `bounds`. `None` where the ray is not finite there.
-    #[inline]
-    pub(crate) fn enter(ray: &Ray<f64>, transform: &Transform, bounds: &Aabb<f64>) -> Option<Self> {
+    /// Enters the object. `None` where the ray is not finite there.
+    #[inline(always)]
+    pub(crate) fn enter(ray: &Ray<f64>, transform: &Transform, object: &Extent) -> Option<Self> {
+        let Extent { center, half } = *object;
         let origin = transform.point_to_object(ray.origin);
         let direction = transform.vector_to_object(ray.direction);
         let length = direction.abs().max_element().power_of_two_below();
@@ -72,9 +88,6 @@ impl LocalRay {
         if !(origin.is_finite() && direction.is_finite() && direction != DVec3::ZERO) {
             return None;
         }
-        let bounds = if bounds.is_empty() { &Aabb::new(DVec3::ZERO, DVec3::ZERO) } else { bounds };
-        let half = half_size(bounds);
-        let center = bounds.center();
         let relative = origin - center;
         let mut shift = 0.0;
         if relative.abs().max_element() > FAR * half {
@@ -82,7 +95,7 @@ impl LocalRay {
             shift = -relative.dot(direction) / direction.dot(direction) - 2.0 * half;
         }
         let moved = origin + direction * shift;
-        let farthest = (moved - bounds.min).abs().max((moved - bounds.max).abs()).max_element();
+        let farthest = (moved - center).abs().max_element() + half;
         let reach = moved.abs() * U + 8.0 * U * farthest;
 
         let (origin32, direction32) = (moved.as_vec3(), direction.as_vec3());
@@ -93,7 +106,7 @@ impl LocalRay {
             direction,
             t_scale: length,
             shift,
-            moved,
+            exact_slabs: Slabs::new(moved, direction),
             reach,
             origin32,
             direction32,
@@ -133,11 +146,10 @@ impl LocalRay {
     /// Raises `t` (local, counted from the true origin) to where the ray enters the primitive's own box, and lowers it
     /// to where it leaves: the rule by which a hit never lies before a box that holds it, so that skipping boxes cannot
     /// change the answer. The box is widened by [`LocalRay::reach`]; `None` when the ray misses even that.
-    #[inline]
+    #[inline(never)]
     pub(crate) fn within_box(&self, t: f64, aabb: &Aabb<f64>) -> Option<f64> {
         let wide = Aabb::new(aabb.min - self.reach(), aabb.max + self.reach());
-        let slabs = Slabs::new(self.moved, self.direction);
-        let (enter, leave) = slabs.padded(&wide, f64::NEG_INFINITY, f64::INFINITY);
+        let (enter, leave) = self.exact_slabs.padded(&wide, f64::NEG_INFINITY, f64::INFINITY);
         (enter <= leave).then(|| t.min(leave + self.shift).max(enter + self.shift))
     }
 }

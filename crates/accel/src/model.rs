@@ -6,9 +6,9 @@ use firsthit_geometry::{Aabb, Precision, Primitive, Ray, Real, Shape, SurfaceHit
 use glam::{DVec3, Vec3};
 
 use crate::build::Topology;
-use crate::kernel::Kernel;
+use crate::kernel::{Kernel, double};
 use crate::layout::Bvh2;
-use crate::local::LocalRay;
+use crate::local::{Extent, LocalRay};
 use crate::query::{Candidate, Collector};
 use crate::stats::Probe;
 use crate::traverse::traverse;
@@ -32,6 +32,7 @@ pub(crate) struct Model {
     scale: f64,
     /// Of all that is bounded, normalised.
     bounds: Aabb<f64>,
+    extent: Extent,
     degenerate: u64,
 }
 
@@ -87,6 +88,7 @@ impl Model {
             unbounded: Vec::new(),
             scale,
             bounds: Aabb::empty(),
+            extent: Extent::default(),
             degenerate: 0,
         };
         // Everything in file order first.
@@ -127,6 +129,7 @@ impl Model {
             }
         }
         model.bounds = boxes.iter().fold(Aabb::empty(), |a, b| a.union(*b)).to_f64();
+        model.extent = Extent::new(&model.bounds);
         let topology = Topology::new(&boxes, options.quality);
         model.tree = Bvh2::new(&topology, &boxes);
         model.depth = topology.depth();
@@ -146,6 +149,10 @@ impl Model {
     /// Box of all that is bounded, normalised; empty when there is nothing.
     pub(crate) fn bounds(&self) -> &Aabb<f64> {
         &self.bounds
+    }
+    /// What a ray needs to know of it.
+    pub(crate) fn extent(&self) -> &Extent {
+        &self.extent
     }
     pub(crate) fn depth(&self) -> u32 {
         self.depth
@@ -199,7 +206,7 @@ impl Model {
         match self.places.get(id.geometry as usize)? {
             Places::Triangles(places) => {
                 let place = *places.get(id.primitive as usize)?;
-                Some(Surface::Triangle(self.triangles.get(place as usize)?.map(|v| v.as_dvec3())))
+                Some(Surface::Triangle(double(self.triangles.get(place as usize)?)))
             }
             Places::Shape(index) => self.shapes.get(*index as usize).map(Surface::Shape),
         }
@@ -241,7 +248,8 @@ impl Model {
                 if SHAPES && let Some(Places::Shape(index)) = self.places.get(self.ids[place].geometry as usize) {
                     self.offer_shape(*index, ray, instance, precision, collector)?;
                 } else if let Some((t, u, v)) = K::test(&setup, ray, &self.triangles[place]) {
-                    let aabb = Aabb::from_points(self.triangles[place].map(|v| v.as_dvec3()));
+                    let [a, b, c] = double(&self.triangles[place]);
+                    let aabb = Aabb::new(a.min(b).min(c), a.max(b).max(c));
                     if let Some(t) = ray.within_box(t, &aabb) {
                         let PrimitiveId { geometry, primitive } = self.ids[place];
                         let t = t / ray.t_scale;

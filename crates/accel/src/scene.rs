@@ -1,6 +1,6 @@
 //! The scene: built once, then only asked.
 
-use core::ops::ControlFlow;
+use core::ops::{ControlFlow, Range};
 use std::sync::Arc;
 
 use firsthit_geometry::{Aabb, Precision, Ray, Real, slab::Slabs, triangle};
@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::build::Topology;
 use crate::instance::{Instance, tight_boxes};
 use crate::kernel::{Double, Fast, Kernel, Robust};
-use crate::layout::Bvh2;
+use crate::layout::{Bvh2, Tree};
 use crate::local::LocalRay;
 use crate::model::{Model, PrimitiveId, Surface, limit};
 use crate::query::{Any, Closest, Collector};
@@ -204,7 +204,8 @@ impl Scene {
     fn world_normal(&self, hit: &Hit) -> DVec3 {
         match self.surface(&hit.id) {
             Some((instance, Surface::Triangle(v))) => {
-                triangle::normal(v).map_or(DVec3::ZERO, |n| instance.transform.normal(n))
+                // Not unit yet: the transform sees to it.
+                instance.transform.normal(triangle::area_vector(v))
             }
             Some((instance, Surface::Shape(_))) => instance.transform.normal(hit.normal),
             None => DVec3::ZERO,
@@ -236,25 +237,29 @@ impl Inner {
         for &i in &self.unbounded {
             let instance = &self.instances[i as usize];
             let model = &self.models[instance.model as usize];
-            if let Some(local) = LocalRay::enter(ray, &instance.transform, model.bounds()) {
+            if let Some(local) = LocalRay::enter(ray, &instance.transform, model.extent()) {
                 model.trace_unbounded(&local, i, precision, collector)?;
             }
         }
-        let slabs = Slabs::new(ray.origin, ray.direction);
         // A distance in the world has gone through an instance and back: a few roundings more than a box's entry.
         let beyond = |t: f64| t + t.abs() * (64.0 * f64::UNIT_ROUNDOFF);
         let before = ray.t_min - ray.t_min.abs() * (64.0 * f64::UNIT_ROUNDOFF);
         let t_max = beyond(collector.t_max());
-        traverse(&self.tree, &slabs, before, t_max, probe, |range, probe| {
+        let mut leaf = |range: Range<usize>, probe: &mut P| {
             for &i in &self.order[range] {
                 let instance = &self.instances[i as usize];
                 let model = &self.models[instance.model as usize];
-                if let Some(local) = LocalRay::enter(ray, &instance.transform, model.bounds()) {
+                if let Some(local) = LocalRay::enter(ray, &instance.transform, model.extent()) {
                     model.trace::<K, C, P>(&local, i, precision, collector, probe)?;
                 }
             }
             ControlFlow::Continue(beyond(collector.t_max()))
-        })
+        };
+        match self.tree.root() {
+            // One instance, or a few: nothing to prepare.
+            Some(root) if root.is_leaf() => leaf(root.range(), probe).map_continue(drop),
+            _ => traverse(&self.tree, &Slabs::new(ray.origin, ray.direction), before, t_max, probe, leaf),
+        }
     }
 
     fn stats(&self, depth: u32) -> SceneStats {

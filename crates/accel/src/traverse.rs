@@ -28,18 +28,16 @@ pub(crate) fn traverse<R: Real, T: Tree<R>, P: Probe>(
         if current.is_leaf() {
             t_max = leaf(current.range(), probe)?;
         } else {
-            let [first, second] = if P::PRUNE {
-                probe.boxes(2);
-                let [a, b] = tree.children(current.first, ray, t_min, t_max);
-                if P::REVERSED && b.is_some() { [b, a] } else { [a, b] }
-            } else {
-                tree.all_children(current.first).map(|c| Some((c, t_min)))
-            };
-            if let Some(later) = second {
-                stack.push(later);
-            }
-            if let Some((child, _)) = first {
-                current = child;
+            probe.boxes(2);
+            let (children, meets, enter) = tree.children(current.first, ray, t_min, t_max);
+            let [left, right] = if P::PRUNE { meets } else { [true; 2] };
+            if left && right {
+                let near = usize::from((enter[1] < enter[0]) != P::REVERSED);
+                stack.push((children[1 - near], enter[1 - near]));
+                current = children[near];
+                continue;
+            } else if left || right {
+                current = children[usize::from(right)];
                 continue;
             }
         }

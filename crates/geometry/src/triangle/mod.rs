@@ -59,7 +59,7 @@ pub fn intersect<R: Real>(precision: Precision, vertices: [R::Vec3; 3], ray: &Ra
 #[must_use]
 pub fn area_vector(v: [DVec3; 3]) -> DVec3 {
     let e = [v[2] - v[1], v[0] - v[2], v[1] - v[0]];
-    let l = e.map(DVec3::length_squared);
+    let l = [e[0].length_squared(), e[1].length_squared(), e[2].length_squared()];
     // Any two edges in cyclic order give the same vector; the longest is left out.
     if l[0] >= l[1] && l[0] >= l[2] {
         e[1].cross(e[2])
@@ -95,8 +95,8 @@ pub fn normal(v: [DVec3; 3]) -> Option<DVec3> {
 pub fn plane_parameter(v: [DVec3; 3], origin: DVec3, direction: DVec3) -> Option<f64> {
     let n = area_vector(v);
     // Of the three vertices, the one nearest to the origin cancels least.
-    let r = v.map(|p| p - origin);
-    let l = r.map(DVec3::length_squared);
+    let r = [v[0] - origin, v[1] - origin, v[2] - origin];
+    let l = [r[0].length_squared(), r[1].length_squared(), r[2].length_squared()];
     let near = if l[0] <= l[1] && l[0] <= l[2] {
         r[0]
     } else if l[1] <= l[2] {
