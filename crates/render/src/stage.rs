@@ -201,8 +201,8 @@ impl Stage {
             ambient_reach: view.map_or(0.0, |v| 0.5 * v.distance),
         };
         let mut stage = Self { world, accel, materials, flags, lights, camera, background, reference, plan, explain };
-        if dim && view.is_some() {
-            stage.lights.ambient = survey::even_light(&stage, options.aspect);
+        if let Some(view) = view.filter(|_| dim) {
+            stage.lights.ambient = survey::even_light(&stage, &view, options.aspect);
         }
         Ok(stage)
     }

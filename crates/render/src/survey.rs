@@ -17,7 +17,7 @@ use crate::sampler::{Dimension, PixelSampler};
 use crate::{EffectPlan, EffectSet, Environment, Stage, warp};
 
 /// Even light in rooms that are lit from the camera, as radiance.
-pub(crate) const AMBIENT: Vec3 = Vec3::splat(0.3);
+pub(crate) const AMBIENT: Vec3 = Vec3::splat(0.27);
 
 /// At most so many materials are named for each effect.
 const NAMED: usize = 6;
@@ -161,7 +161,7 @@ pub(crate) struct Headlight {
 
 impl Headlight {
     pub(crate) fn light(&self) -> PunctualLight {
-        PunctualLight::Headlight { position: self.position, irradiance: 3.0, distance: self.distance }
+        PunctualLight::Headlight { position: self.position, irradiance: 2.6, distance: self.distance }
     }
 }
 
@@ -170,7 +170,9 @@ impl Headlight {
 pub(crate) struct View {
     /// How far away half of what is seen is.
     pub(crate) distance: f64,
-    /// The surroundings hardly reach what is seen.
+    /// Share of its hemisphere that is open to the surroundings at a typical visible point.
+    pub(crate) open: f64,
+    /// It fills the picture, and the surroundings hardly reach it.
     pub(crate) indoors: bool,
 }
 
@@ -209,15 +211,16 @@ pub(crate) fn view(accel: &firsthit_accel::Scene, camera: &Camera, aspect: f64) 
             }
         }
     }
-    let indoors = 2 * distances.len() >= all && open < INDOORS * distances.len() as f64;
+    let seen = distances.len();
     distances.sort_unstable_by(f64::total_cmp);
-    Some(View { distance: *distances.get(distances.len() / 2)?, indoors })
+    let (distance, open) = (*distances.get(seen / 2)?, open / seen as f64);
+    Some(View { distance, open, indoors: 2 * seen >= all && open < INDOORS })
 }
 
-/// Even light for a stage with lights of its own: a quarter of the mean radiance of what its lights reach, in place of
-/// the light that surfaces send to each other (the ambient term of progressive radiosity, Cohen et al. 1988, with a
-/// guess instead of a sum).
-pub(crate) fn even_light(stage: &Stage, aspect: f64) -> Vec3 {
+/// Even light for a stage with lights of its own, in place of the light that surfaces send to each other: the mean
+/// radiance of what is seen, for the share of directions that is not open (as the ambient term of progressive
+/// radiosity, Cohen et al. 1988, by a guess instead of a sum).
+pub(crate) fn even_light(stage: &Stage, view: &View, aspect: f64) -> Vec3 {
     let clip = ClipRegion::default();
     let mut tracer = Tracer::<true, true>::new(stage, &clip);
     let limits = Limits { bounces: 1, follow: LobeKind::empty() };
@@ -235,5 +238,5 @@ pub(crate) fn even_light(stage: &Stage, aspect: f64) -> Vec3 {
             seen += 1;
         }
     }
-    Vec3::splat(if seen > 0 { 0.25 * sum / seen as f32 } else { 0.0 })
+    Vec3::splat(if seen > 0 { (1.0 - view.open) as f32 * sum / seen as f32 } else { 0.0 })
 }
