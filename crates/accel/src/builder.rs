@@ -6,6 +6,7 @@ use glam::{DAffine3, Vec3};
 use crate::{BuildError, BuildOptions, Scene};
 
 /// A part of a mesh.
+#[allow(clippy::large_enum_variant, reason = "one for each shape of a scene, not for each primitive")]
 #[derive(Clone, Debug)]
 pub enum Geometry {
     /// Indexed triangles.

@@ -4,6 +4,7 @@ mod degenerate;
 mod invariance;
 mod leaks;
 mod rays;
+mod shapes;
 mod spawn;
 mod twins;
 
