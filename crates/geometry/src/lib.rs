@@ -17,6 +17,7 @@ mod aabb;
 pub mod clip;
 pub mod distance;
 pub mod error;
+pub mod exact;
 pub mod frustum;
 pub mod mesh;
 pub mod offset;
