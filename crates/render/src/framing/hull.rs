@@ -123,11 +123,12 @@ fn stand(scene: &Scene, bounds: &Aabb<f64>, floor: &Floor, closed: f64) -> Optio
         if !below.is_some_and(|y| (y - floor.height).abs() <= 0.35 * (eye - floor.height)) {
             continue;
         }
+        let views: [_; FAN] = std::array::from_fn(|k| scene.closest_hit(&Ray::new(position, ahead(k))));
         // Where a ray leaves the hull there is nothing to look at.
-        let free: [f64; FAN] = std::array::from_fn(|k| {
-            scene.closest_hit(&Ray::new(position, ahead(k))).map_or(0.0, |hit| hit.t.min(widest))
-        });
-        if free.iter().any(|d| *d < 0.02 * widest) {
+        let free = views.map(|hit| hit.map_or(0.0, |hit| hit.t.min(widest)));
+        // Not inside a solid either, of which all sides are back sides.
+        let back = (0..FAN).filter(|k| views[*k].is_some_and(|hit| hit.normal.dot(ahead(*k)) > 0.0)).count();
+        if free.iter().any(|d| *d < 0.02 * widest) || 2 * back > FAN {
             continue;
         }
         for k in 0..FAN {

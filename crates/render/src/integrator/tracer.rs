@@ -104,11 +104,16 @@ impl<'a, const TEXTURES: bool, const FILTERED: bool> Tracer<'a, TEXTURES, FILTER
     fn is_seen(&self, ray: &Ray<f64>, hit: &Hit) -> bool {
         let world = &self.stage.world;
         let material = world.material(hit.id);
-        let flags = self.stage.flags[material];
-        if flags.culls && !world.faces(hit.id, ray.direction) {
+        if self.is_culled(ray, hit, material) {
             return false;
         }
-        !flags.alpha || self.stage.materials[material].coverage::<TEXTURES>(&world.attributes(hit, true)) > 0.0
+        !self.stage.flags[material].alpha
+            || self.stage.materials[material].coverage::<TEXTURES>(&world.attributes(hit, true)) > 0.0
+    }
+
+    /// Whether a surface is not there for a ray that meets its back.
+    fn is_culled(&self, ray: &Ray<f64>, hit: &Hit, material: usize) -> bool {
+        self.stage.flags[material].culls && !self.stage.world.faces(hit.id, ray.direction)
     }
 
     /// Whether anything lies between a point and infinity or `distance`, alpha included (clear surfaces count as
@@ -117,16 +122,19 @@ impl<'a, const TEXTURES: bool, const FILTERED: bool> Tracer<'a, TEXTURES, FILTER
         self.timed(kind, |this| {
             let Some(ray) = this.clipped(ray) else { return false };
             this.stage.accel.any_hit_filtered(&ray, Some(source), |hit| {
+                if !FILTERED {
+                    return true;
+                }
                 let material = this.stage.world.material(hit.id);
-                !FILTERED
-                    || !this.stage.flags[material].alpha
-                    || this.stage.materials[material].coverage::<TEXTURES>(&this.stage.world.attributes(hit, true))
-                        > covers
+                !this.is_culled(&ray, hit, material)
+                    && (!this.stage.flags[material].alpha
+                        || this.stage.materials[material].coverage::<TEXTURES>(&this.stage.world.attributes(hit, true))
+                            > covers)
             })
         })
     }
 
-    /// The share of a light sample's light that arrives: shadow rays meet both sides of every surface, pass holes and
+    /// The share of a light sample's light that arrives: shadow rays see what other rays see, pass holes and
     /// partly covering surfaces, and go straight through clear ones.
     pub(crate) fn transmittance(&mut self, kind: RayKind, from: DVec3, sample: &LightSample, source: HitId) -> Vec3 {
         if !self.shadows {
@@ -162,6 +170,9 @@ impl<'a, const TEXTURES: bool, const FILTERED: bool> Tracer<'a, TEXTURES, FILTER
                 return false;
             }
             let index = world.material(hit.id);
+            if self.is_culled(ray, hit, index) {
+                return false;
+            }
             if !stage.flags[index].lets_through {
                 return true;
             }

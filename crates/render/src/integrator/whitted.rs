@@ -247,8 +247,9 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
             // The last one pushed is traced first: reflections before refractions, as they are listed.
             for (i, lobe) in lobes() {
                 let sampler = path.sampler.branch(i as u32 + 1);
-                // Weak reflections, as of plastics, are followed now and then.
-                let chance = if self.stage.reference { 1.0 } else { (4.0 * strength(lobe)).min(1.0) };
+                // Weak reflections in reflections, as of plastics, are followed now and then.
+                let all = path.bounce == 0 || self.stage.reference;
+                let chance = if all { 1.0 } else { (4.0 * strength(lobe)).min(1.0) };
                 if chance < 1.0 && !(sampler.get1(Dimension::Roulette(path.bounce)) < chance) {
                     continue;
                 }

@@ -137,7 +137,8 @@ impl Material {
         if let Model::Pbr(pbr) = &self.model { Some(pbr) } else { None }
     }
 
-    /// Whether its back faces are not there for rays that see (shadow rays meet both sides).
+    /// Whether its back faces are not there, as glTF says of single-sided materials. That holds for shadow rays too:
+    /// what is seen through a hidden back face is lit through it.
     pub(crate) fn culls(&self) -> bool {
         !self.solid && self.pbr().is_some_and(|p| !p.double_sided)
     }
