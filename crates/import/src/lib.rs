@@ -21,6 +21,8 @@ mod open;
 mod place;
 mod report;
 pub mod scene;
+#[cfg(test)]
+mod tests;
 pub mod toml;
 
 pub use error::{ErrorKind, ImportError};

@@ -1,5 +1,6 @@
 //! What was read only in part: warnings are data, not log lines.
 
+use std::collections::BTreeSet;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -70,6 +71,9 @@ pub struct Report {
     pub warnings: Vec<Warning>,
     /// How many more there were.
     pub more_warnings: u64,
+    /// The files that were read, by their canonical paths: the one that was opened and all that it led to. Whoever
+    /// writes a file can make sure that it is none of them.
+    pub files: BTreeSet<PathBuf>,
     /// The extensions that the file names.
     pub extensions: Vec<ExtensionUse>,
     /// Animations in the file (they are not played).
@@ -90,12 +94,18 @@ impl Report {
         }
     }
 
+    /// Notes a file that is read. One that is not there is not.
+    pub(crate) fn reads(&mut self, file: &Path) {
+        self.files.extend(file.canonicalize());
+    }
+
     /// Takes over what another file's reading brought up.
     pub fn absorb(&mut self, other: Self) {
         for w in other.warnings {
             self.warn(w.file, w.place, w.message);
         }
         self.more_warnings += other.more_warnings;
+        self.files.extend(other.files);
         for e in other.extensions {
             if !self.extensions.iter().any(|x| x.name == e.name) {
                 self.extensions.push(e);

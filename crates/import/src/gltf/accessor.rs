@@ -279,7 +279,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::Limits;
+    use crate::{Limits, Report};
 
     /// Reads accessor 0 of a file whose only buffer is `bin`.
     fn with<T>(json: &str, bin: &[u8], f: impl FnOnce(Accessor<'_>) -> T) -> Result<T, String> {
@@ -287,7 +287,7 @@ mod tests {
         let text =
             format!(r#"{{"asset": {{"version": "2.0"}}, "buffers": [{{"byteLength": {}}}], {json}}}"#, bin.len());
         let root = Root::from_str(&text).map_err(|e| e.to_string())?;
-        let source = Source::new(file, &root, Some(bin), &limits).map_err(|e| e.to_string())?;
+        let source = Source::new(file, &root, Some(bin), &limits, &mut Report::default()).map_err(|e| e.to_string())?;
         Accessor::new(&source, Index::new(0)).map(f).map_err(|e| e.to_string())
     }
 

@@ -74,9 +74,10 @@ pub fn read(path: &Path, options: &Options) -> Result<Imported, ImportError> {
     };
     let json::Document { root, value, animations } = json::parse(path, text)?;
     let mut report = Report { animations, ..Report::default() };
+    report.reads(path);
     extensions::check(path, &root, &mut report)?;
     json::check_references(path, &root)?;
-    let source = Source::new(path, &root, bin, &options.limits)?;
+    let source = Source::new(path, &root, bin, &options.limits, &mut report)?;
     check_accessors(&source)?;
     let nodes = Nodes::new(&source, &value, &mut report)?;
     report.triangles_all_scenes = triangles_all_scenes(&root);

@@ -8,7 +8,7 @@ use gltf::json::{Index, Root, buffer};
 
 use super::uri::{self, Uri};
 use crate::files::{self, Folder};
-use crate::{ErrorKind, ImportError, Limits};
+use crate::{ErrorKind, ImportError, Limits, Report};
 
 /// The parsed JSON, its references checked, and the bytes that it refers to.
 pub(super) struct Source<'a> {
@@ -30,13 +30,14 @@ impl<'a> Source<'a> {
         root: &'a Root,
         bin: Option<&'a [u8]>,
         limits: &'a Limits,
+        report: &mut Report,
     ) -> Result<Self, ImportError> {
         let mut source = Self { file, root, folder: Folder::of(file)?, limits, buffers: Vec::new() };
         let mut total = 0_u64;
         for (i, buffer) in root.buffers.iter().enumerate() {
             let place = format!("/buffers/{i}");
             let bytes = match (&buffer.uri, bin) {
-                (Some(uri), _) => Some(Cow::Owned(source.resource(uri, &format!("{place}/uri"))?)),
+                (Some(uri), _) => Some(Cow::Owned(source.resource(uri, &format!("{place}/uri"), report)?)),
                 (None, Some(bin)) if i == 0 => Some(Cow::Borrowed(bin)),
                 (None, _) => None,
             };
@@ -56,7 +57,7 @@ impl<'a> Source<'a> {
     }
 
     /// The data of a URI: of the URI itself or of a file in the model's folder.
-    pub(super) fn resource(&self, text: &str, place: &str) -> Result<Vec<u8>, ImportError> {
+    pub(super) fn resource(&self, text: &str, place: &str, report: &mut Report) -> Result<Vec<u8>, ImportError> {
         match uri::parse(text).map_err(|cause| self.invalid(place, cause))? {
             Uri::Data(bytes) => Ok(bytes),
             Uri::File(name) => {
@@ -64,6 +65,7 @@ impl<'a> Source<'a> {
                     ErrorKind::Io(e) => self.at(place, ErrorKind::Invalid(format!("'{name}' cannot be read: {e}"))),
                     kind => self.at(place, kind),
                 })?;
+                report.reads(&path);
                 files::read(&path, self.limits)
             }
         }

@@ -104,7 +104,7 @@ impl<'a> Textures<'a> {
         let mut encoded = Vec::new();
         for (k, &shown) in self.used.iter().enumerate() {
             let bytes = match shown {
-                Shown::Image(index) => self.bytes(index),
+                Shown::Image(index) => self.bytes(index, report),
                 Shown::Nothing { texture } => {
                     Err(self.source.invalid(format!("/textures/{texture}"), "has no image that can be read"))
                 }
@@ -131,11 +131,11 @@ impl<'a> Textures<'a> {
         images
     }
 
-    fn bytes(&self, index: usize) -> Result<Vec<u8>, ImportError> {
+    fn bytes(&self, index: usize, report: &mut Report) -> Result<Vec<u8>, ImportError> {
         let image = &self.source.root.images[index];
         let place = format!("/images/{index}");
         match (&image.uri, image.buffer_view) {
-            (Some(uri), _) => self.source.resource(uri, &(place + "/uri")),
+            (Some(uri), _) => self.source.resource(uri, &(place + "/uri"), report),
             (None, Some(view)) => self.source.view(view).map(<[u8]>::to_vec),
             (None, None) => Err(self.source.invalid(place, "has neither a URI nor a buffer view")),
         }

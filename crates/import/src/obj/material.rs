@@ -89,6 +89,7 @@ impl ImageFiles {
     }
 
     fn read(&self, limits: &Limits, report: &mut Report) -> Images {
+        self.paths.iter().for_each(|path| report.reads(path));
         let bytes: Vec<_> = self.paths.iter().map(|path| files::read(path, limits)).collect();
         let names: Vec<String> = self.paths.iter().map(|p| p.to_string_lossy().into_owned()).collect();
         let sources: Vec<_> =

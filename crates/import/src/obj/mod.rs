@@ -87,7 +87,9 @@ use crate::{ImportError, Imported, Options, Report, SceneDesc};
 /// [`ImportError`] with the line and what is wrong there. Libraries and images that cannot be read are only warnings.
 pub fn read(path: impl AsRef<Path>, options: &Options) -> Result<Imported, ImportError> {
     let path = path.as_ref();
-    read_bytes(files::read(path, &options.limits)?, path, options)
+    let mut imported = read_bytes(files::read(path, &options.limits)?, path, options)?;
+    imported.report.reads(path);
+    Ok(imported)
 }
 
 /// As [`read`], of bytes at hand, not compressed. The files they name are looked for beside `path`, which need not

@@ -46,6 +46,7 @@ pub(super) fn load(
             if !libraries.insert(path.clone()) {
                 continue;
             }
+            report.reads(&path);
             let bytes = match files::read(&path, limits) {
                 Ok(bytes) => bytes,
                 Err(e) => {

@@ -33,7 +33,7 @@ pub(super) fn build(
         chain,
         reference: scene_file.conventions.unwrap_or(by_notation) == Conventions::Reference,
         scene: SceneDesc::default(),
-        report: Report::default(),
+        report: Report { files: chain.last().cloned().into_iter().collect(), ..Report::default() },
         material_index: HashMap::new(),
         default_material: None,
         images: HashMap::new(),
@@ -235,6 +235,7 @@ impl Builder<'_> {
         if let Some(&index) = self.images.get(&real) {
             return Ok(index);
         }
+        self.report.files.insert(real.clone());
         let image = image::read(&path, &self.options.limits)?;
         // What one image takes, the next ones cannot.
         let limits = &mut self.options.limits;
