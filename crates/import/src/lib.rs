@@ -21,12 +21,13 @@ mod open;
 mod place;
 mod report;
 pub mod scene;
+pub mod srgb;
 #[cfg(test)]
 mod tests;
 pub mod toml;
 
 pub use error::{ErrorKind, ImportError};
 pub use limits::Limits;
-pub use open::{Imported, Options, UpAxis, open};
+pub use open::{Imported, NotAnAxis, Options, UpAxis, open};
 pub use report::{ExtensionUse, Report, Support, Warning};
 pub use scene::SceneDesc;

@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 use glam::{DAffine3, DMat3, DVec3};
 
@@ -39,6 +40,28 @@ impl UpAxis {
             Self::NegZ => [DVec3::X, DVec3::Z, DVec3::NEG_Y],
         };
         DAffine3::from_mat3(DMat3::from_cols(x, y, z))
+    }
+}
+
+/// A word that names no axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("expected +X, -X, +Y, -Y, +Z or -Z")]
+pub struct NotAnAxis;
+
+impl FromStr for UpAxis {
+    type Err = NotAnAxis;
+
+    /// Reads `+X`, also written `X`, `x` or `+x`; likewise the others.
+    fn from_str(name: &str) -> Result<Self, NotAnAxis> {
+        Ok(match name.to_ascii_uppercase().as_str() {
+            "+X" | "X" => Self::PosX,
+            "-X" => Self::NegX,
+            "+Y" | "Y" => Self::PosY,
+            "-Y" => Self::NegY,
+            "+Z" | "Z" => Self::PosZ,
+            "-Z" => Self::NegZ,
+            _ => return Err(NotAnAxis),
+        })
     }
 }
 

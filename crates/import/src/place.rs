@@ -3,9 +3,7 @@
 use glam::{DAffine3, DMat3, DVec3};
 
 use crate::SceneDesc;
-use crate::scene::{
-    CameraDesc, EnvironmentDesc, InstanceDesc, LightDesc, LightKind, MaterialModel, PbrMaterial, Projection, TextureRef,
-};
+use crate::scene::{CameraDesc, EnvironmentDesc, InstanceDesc, LightDesc, LightKind, MaterialModel, Projection};
 
 /// What of a scene has a place in the world. Indices are those of the scene it was adopted by.
 #[derive(Clone, Debug, Default)]
@@ -50,7 +48,7 @@ impl SceneDesc {
         }
         for m in &mut other.materials {
             if let MaterialModel::Pbr(pbr) = &mut m.model {
-                pbr.textures_mut().into_iter().flatten().for_each(|t| t.image += image);
+                pbr.textures_mut().for_each(|t| t.image += image);
             }
         }
         if self.environment.is_none() {
@@ -81,26 +79,6 @@ impl SceneDesc {
             cameras: std::mem::take(&mut self.cameras),
         };
         self.place(parts, by);
-    }
-}
-
-impl PbrMaterial {
-    /// Every texture slot, for whoever has to treat all of them alike.
-    pub(crate) fn textures_mut(&mut self) -> [&mut Option<TextureRef>; 12] {
-        [
-            &mut self.base_color_texture,
-            &mut self.opacity_texture,
-            &mut self.metallic_texture,
-            &mut self.roughness_texture,
-            &mut self.normal_texture,
-            &mut self.bump_texture,
-            &mut self.occlusion_texture,
-            &mut self.emissive_texture,
-            &mut self.transmission_texture,
-            &mut self.thickness_texture,
-            &mut self.specular_texture,
-            &mut self.specular_color_texture,
-        ]
     }
 }
 

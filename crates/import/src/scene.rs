@@ -269,6 +269,38 @@ impl Default for PbrMaterial {
     }
 }
 
+/// Every texture slot of a material.
+macro_rules! texture_slots {
+    ($material:ident, $($borrow:tt)+) => {
+        [
+            $($borrow)+ $material.base_color_texture,
+            $($borrow)+ $material.opacity_texture,
+            $($borrow)+ $material.metallic_texture,
+            $($borrow)+ $material.roughness_texture,
+            $($borrow)+ $material.normal_texture,
+            $($borrow)+ $material.bump_texture,
+            $($borrow)+ $material.occlusion_texture,
+            $($borrow)+ $material.emissive_texture,
+            $($borrow)+ $material.transmission_texture,
+            $($borrow)+ $material.thickness_texture,
+            $($borrow)+ $material.specular_texture,
+            $($borrow)+ $material.specular_color_texture,
+        ]
+    };
+}
+
+impl PbrMaterial {
+    /// All textures it has, for whoever treats them alike.
+    pub fn textures(&self) -> impl Iterator<Item = &TextureRef> {
+        texture_slots!(self, &).into_iter().flatten()
+    }
+
+    /// All textures it has, to be changed.
+    pub fn textures_mut(&mut self) -> impl Iterator<Item = &mut TextureRef> {
+        texture_slots!(self, &mut).into_iter().flatten()
+    }
+}
+
 /// How an image is put on a surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TextureRef {

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::{Imported, Options, open};
+use crate::{Imported, NotAnAxis, Options, UpAxis, open};
 
 /// A folder with these files; one that is called `*.png` is an image.
 fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
@@ -53,4 +53,11 @@ fn all_files_that_were_read_are_named() {
         names(read(dir.path())),
         ["a.gltf", "a.mtl", "a.obj", "cow.png", "data.bin", "leaf.png", "scene.toml", "sky.png"]
     );
+}
+
+#[test]
+fn axes_are_read_by_their_names() {
+    assert_eq!(["+X", "y", "Z"].map(str::parse), [Ok(UpAxis::PosX), Ok(UpAxis::PosY), Ok(UpAxis::PosZ)]);
+    assert_eq!(["-x", "-Y", "-Z"].map(str::parse), [Ok(UpAxis::NegX), Ok(UpAxis::NegY), Ok(UpAxis::NegZ)]);
+    assert_eq!(["", "W", "+ X", "--X"].map(str::parse::<UpAxis>), [Err(NotAnAxis); 4]);
 }

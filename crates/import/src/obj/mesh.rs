@@ -8,8 +8,8 @@ use glam::{DVec3, Vec2, Vec3, Vec4};
 use super::normals;
 use super::parse::{Corner, Model, NONE, place};
 use super::polygon::{Outcome, Triangulator};
-use crate::Report;
 use crate::scene::TriangleMesh;
+use crate::{Report, srgb};
 
 /// The triangles of all parts of a model.
 pub(super) struct Meshes {
@@ -73,11 +73,7 @@ fn linear_colors(model: &Model, file: &Path, report: &mut Report) -> Vec<Vec4> {
         report.warn(file, "", "vertex colours above 1 taken as 0 to 255");
     }
     let scale = if bytes { 1.0 / 255.0 } else { 1.0 };
-    let linear = |c: f32| {
-        let c = (c * scale).clamp(0.0, 1.0);
-        // IEC 61966-2-1.
-        if c <= 0.040_45 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
-    };
+    let linear = |c: f32| srgb::to_linear(f64::from((c * scale).clamp(0.0, 1.0))) as f32;
     model.colors.iter().map(|c| Vec3::from(c.map(linear)).extend(1.0)).collect()
 }
 

@@ -15,7 +15,7 @@ use crate::place::Placeable;
 use crate::scene::{
     EnvironmentDesc, GeometryDesc, ImageDesc, InstanceDesc, MaterialDesc, MaterialModel, MeshDesc, Pixels, SurfaceDesc,
 };
-use crate::{ErrorKind, ImportError, Imported, Options, Report, SceneDesc, UpAxis, image};
+use crate::{ErrorKind, ImportError, Imported, Options, Report, SceneDesc, image};
 
 /// Builds the scene of a file. `chain` are the scene files that led here, this one last.
 pub(super) fn build(
@@ -167,7 +167,7 @@ impl Builder<'_> {
                 parts
             }
         };
-        let turned = model.up.map_or(DAffine3::IDENTITY, |up| UpAxis::from(up).to_y());
+        let turned = model.up.map_or(DAffine3::IDENTITY, |up| up.0.to_y());
         self.scene.place(parts, transform * turned);
         self.check_limits()
     }

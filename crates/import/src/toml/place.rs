@@ -2,8 +2,7 @@
 
 use glam::{DAffine3, DMat3, DQuat, DVec3, DVec4};
 
-use super::schema::{Transform, Up};
-use crate::UpAxis;
+use super::schema::Transform;
 
 /// The matrix of an object's `transform`.
 pub(super) fn affine(t: &Transform) -> Result<DAffine3, String> {
@@ -91,17 +90,4 @@ pub(super) fn between(from: DVec3, to: DVec3) -> Result<(DAffine3, f64), String>
         return Err("'from' and 'to' must be different points at a finite distance".to_owned());
     };
     Ok((DAffine3::from_rotation_translation(DQuat::from_rotation_arc(DVec3::Y, direction), from), length))
-}
-
-impl From<Up> for UpAxis {
-    fn from(up: Up) -> Self {
-        match up {
-            Up::PosX => Self::PosX,
-            Up::NegX => Self::NegX,
-            Up::PosY => Self::PosY,
-            Up::NegY => Self::NegY,
-            Up::PosZ => Self::PosZ,
-            Up::NegZ => Self::NegZ,
-        }
-    }
 }

@@ -8,6 +8,7 @@ use serde::Deserialize;
 use serde::de::{self, Deserializer, IgnoredAny, MapAccess, Visitor};
 
 use super::values::{Color, Named, Number, Pair, Scale, Triple};
+use crate::{NotAnAxis, UpAxis};
 
 /// The whole file.
 #[derive(Debug, Default, Deserialize)]
@@ -337,20 +338,17 @@ pub(super) struct Model {
     pub(super) materials: Named<String>,
 }
 
+/// An axis by its name.
 #[derive(Clone, Copy, Debug, Deserialize)]
-pub(super) enum Up {
-    #[serde(rename = "+X", alias = "X")]
-    PosX,
-    #[serde(rename = "-X")]
-    NegX,
-    #[serde(rename = "+Y", alias = "Y")]
-    PosY,
-    #[serde(rename = "-Y")]
-    NegY,
-    #[serde(rename = "+Z", alias = "Z")]
-    PosZ,
-    #[serde(rename = "-Z")]
-    NegZ,
+#[serde(try_from = "String")]
+pub(super) struct Up(pub(super) UpAxis);
+
+impl TryFrom<String> for Up {
+    type Error = NotAnAxis;
+
+    fn try_from(name: String) -> Result<Self, NotAnAxis> {
+        name.parse().map(Self)
+    }
 }
 
 #[derive(Debug, Deserialize)]

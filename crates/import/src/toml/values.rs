@@ -6,6 +6,8 @@ use std::marker::PhantomData;
 use glam::{DVec2, DVec3, Vec3};
 use serde::de::{self, Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 
+use crate::srgb;
+
 /// A finite number.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd, serde::Deserialize)]
 #[serde(try_from = "f64")]
@@ -98,7 +100,8 @@ impl<'de> Deserialize<'de> for Color {
                 self.visit_f64(x as f64)
             }
             fn visit_str<E: de::Error>(self, s: &str) -> Result<Color, E> {
-                from_hex(s).map(Color).ok_or_else(|| E::invalid_value(de::Unexpected::Str(s), &self))
+                let rgb = srgb::from_hex(s).map(|rgb| rgb.map(|x| srgb::to_linear(x) as f32));
+                rgb.map(|rgb| Color(rgb.into())).ok_or_else(|| E::invalid_value(de::Unexpected::Str(s), &self))
             }
             fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<Color, A::Error> {
                 let rgb = <[f64; 3]>::deserialize(de::value::SeqAccessDeserializer::new(seq))?;
@@ -118,17 +121,6 @@ fn channel(x: f64) -> Result<f32, String> {
     } else {
         Err(format!("a colour must be finite and not negative, but here is {x}"))
     }
-}
-
-/// `#rrggbb`, decoded by the sRGB curve (IEC 61966-2-1).
-fn from_hex(s: &str) -> Option<Vec3> {
-    let digits = s.strip_prefix('#').filter(|d| d.len() == 6 && d.bytes().all(|b| b.is_ascii_hexdigit()))?;
-    let rgb = u32::from_str_radix(digits, 16).ok()?;
-    let linear = |shift: u32| {
-        let x = f64::from((rgb >> shift) & 0xff) / 255.0;
-        (if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }) as f32
-    };
-    Some(Vec3::new(linear(16), linear(8), linear(0)))
 }
 
 /// A table of named things, in the order of the file; a name may stand there once.

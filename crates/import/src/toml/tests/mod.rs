@@ -274,13 +274,14 @@ fn textures_are_names_or_tables() {
         "specular_color",
     ];
     let all: String = slots.map(|s| format!("{s}_texture = 'checker.png', ")).concat();
-    let mut m = pbr(&all);
+    let m = pbr(&all);
     let (metallic, roughness) = (m.metallic_texture.clone(), m.roughness_texture.clone());
     assert_eq!(
         (metallic.map(|t| t.channel), roughness.map(|t| t.channel)),
         (Some(Channel::Blue), Some(Channel::Green))
     );
-    assert!(m.textures_mut().iter().all(|t| t.as_ref().is_some_and(|t| t.image == 0)), "one file, one image");
+    assert_eq!(m.textures().count(), 12, "every slot");
+    assert!(m.textures().all(|t| t.image == 0), "one file, one image");
 
     let t = pbr("base_color_texture = { file = 'checker.png', uv_set = 1, scale = [2, 4], offset = [0.5, 0], \
         rotation_deg = 90, wrap = 'mirror', filter = 'nearest', channel = 'alpha' }")
