@@ -5,7 +5,7 @@ use firsthit_geometry::{Precision, Ray};
 use firsthit_tests::oracle::{Aim, Mesh, Rng, grid_cube, icosphere, read_obj};
 use glam::{DAffine3, DVec3, Vec3};
 
-use crate::{scene_of, triangles};
+use crate::{bits, scene_of, triangles};
 
 /// Rays at vertices, edges and faces, from around and inside.
 fn aimed(mesh: &Mesh, count: usize) -> Vec<Ray<f64>> {
@@ -18,10 +18,6 @@ fn aimed(mesh: &Mesh, count: usize) -> Vec<Ray<f64>> {
             Ray::new(origin, target - origin)
         })
         .collect()
-}
-
-fn bits(h: &Option<Hit>) -> Option<([u32; 3], u64, u32, u32)> {
-    h.map(|h| ([h.id.instance, h.id.geometry, h.id.primitive], h.t.to_bits(), h.u.to_bits(), h.v.to_bits()))
 }
 
 fn same_in_any_order(scene: &Scene, rays: &[Ray<f64>], name: &str) {

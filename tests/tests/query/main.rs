@@ -8,7 +8,7 @@ mod shapes;
 mod spawn;
 mod twins;
 
-use firsthit_accel::{BuildOptions, Geometry, Scene, SceneBuilder};
+use firsthit_accel::{BuildOptions, Geometry, Hit, HitId, Scene, SceneBuilder};
 use firsthit_geometry::Precision;
 use firsthit_tests::oracle::Mesh;
 use glam::DAffine3;
@@ -27,4 +27,12 @@ fn scene_of(mesh: &Mesh, transform: DAffine3, precision: Precision) -> Scene {
     let m = builder.add_mesh(vec![triangles(mesh)]);
     builder.add_instance(m, transform);
     builder.build().expect("a good mesh")
+}
+
+/// A hit in bits: id, t, u, v, normal.
+type Bits = (HitId, u64, u32, u32, [u64; 3]);
+
+/// For comparisons in which no bit may differ, not even a sign of zero.
+fn bits(h: &Option<Hit>) -> Option<Bits> {
+    h.map(|h| (h.id, h.t.to_bits(), h.u.to_bits(), h.v.to_bits(), h.normal.to_array().map(f64::to_bits)))
 }

@@ -1,12 +1,11 @@
 //! Rays of all lengths and intervals; invalid ones; batches.
 
-use firsthit_accel::{Hit, Scene, SceneBuilder};
+use firsthit_accel::{Scene, SceneBuilder};
 use firsthit_geometry::{Precision, Ray};
-use firsthit_tests::oracle::{Rng, icosphere};
+use firsthit_tests::oracle::{Mesh, Rng, icosphere};
 use glam::{DAffine3, DVec3, Vec3};
 
-use crate::{options, scene_of, triangles};
-use firsthit_tests::oracle::Mesh;
+use crate::{bits, options, scene_of, triangles};
 
 /// The square `z = 0`, `|x|, |y| <= 1`.
 fn square(precision: Precision) -> Scene {
@@ -89,13 +88,6 @@ fn invalid_rays_hit_nothing_and_disturb_nobody() {
     for r in mixed.iter().step_by(3) {
         assert!(!scene.any_hit(r) && firsthit_accel::reference::closest_hit(&scene, r).is_none());
     }
-}
-
-fn bits(h: &Option<Hit>) -> Option<([u32; 3], u64, u32, u32, [u64; 3])> {
-    h.map(|h| {
-        let id = [h.id.instance, h.id.geometry, h.id.primitive];
-        (id, h.t.to_bits(), h.u.to_bits(), h.v.to_bits(), h.normal.to_array().map(f64::to_bits))
-    })
 }
 
 #[test]
