@@ -230,7 +230,8 @@ impl Model {
         }
     }
 
-    #[inline(always)]
+    /// A function of its own, so that its loop has the registers.
+    #[inline(never)]
     fn trace_tree<K: Kernel, C: Collector, P: Probe, const SHAPES: bool>(
         &self,
         ray: &LocalRay,

@@ -29,16 +29,26 @@ pub(crate) fn traverse<R: Real, T: Tree<R>, P: Probe>(
             t_max = leaf(current.range(), probe)?;
         } else {
             probe.boxes(2);
-            let (children, meets, enter) = tree.children(current.first, ray, t_min, t_max);
-            let [left, right] = if P::PRUNE { meets } else { [true; 2] };
-            if left && right {
-                let near = usize::from((enter[1] < enter[0]) != P::REVERSED);
-                stack.push((children[1 - near], enter[1 - near]));
-                current = children[near];
-                continue;
-            } else if left || right {
-                current = children[usize::from(right)];
-                continue;
+            let ([left, right], meets, enter) = tree.children(current.first, ray, t_min, t_max);
+            let meets = if P::PRUNE { meets } else { [true; 2] };
+            // Chosen by value: an index into the pair would send it through memory.
+            match meets {
+                [true, true] => {
+                    let right_first = (enter[1] < enter[0]) != P::REVERSED;
+                    let (near, far) = if right_first { (right, left) } else { (left, right) };
+                    stack.push((far, if right_first { enter[0] } else { enter[1] }));
+                    current = near;
+                    continue;
+                }
+                [true, false] => {
+                    current = left;
+                    continue;
+                }
+                [false, true] => {
+                    current = right;
+                    continue;
+                }
+                [false, false] => {}
             }
         }
         loop {

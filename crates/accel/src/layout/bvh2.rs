@@ -18,7 +18,7 @@ pub(crate) struct Bvh2<R> {
 struct Node<R> {
     /// By axis: the lower planes of both children, then the upper planes negated. So the larger of two values is the
     /// tighter one for all four, and one instruction of four lanes serves.
-    planes: [[R; 4]; 3],
+    planes: [[[R; 2]; 2]; 3],
     children: [Child; 2],
 }
 
@@ -27,7 +27,7 @@ const _: () = assert!(size_of::<Node<f32>>() == 64);
 impl<R: Real> Bvh2<R> {
     /// Boxes are joined upwards from those of the primitives.
     pub(crate) fn new(topology: &Topology, boxes: &[Aabb<R>]) -> Self {
-        let empty = Node { planes: [[R::INFINITY; 4]; 3], children: [Child::default(); 2] };
+        let empty = Node { planes: [[[R::INFINITY; 2]; 2]; 3], children: [Child::default(); 2] };
         let mut nodes = vec![empty; topology.nodes.len()];
         for i in (0..nodes.len()).rev() {
             let children = topology.nodes[i];
@@ -41,7 +41,7 @@ impl<R: Real> Bvh2<R> {
             });
             nodes[i].children = children;
             let [l, r]: [Aabb<R>; 2] = below;
-            nodes[i].planes = [0, 1, 2].map(|k| [l.min.axis(k), r.min.axis(k), -l.max.axis(k), -r.max.axis(k)]);
+            nodes[i].planes = [0, 1, 2].map(|k| [[l.min.axis(k), r.min.axis(k)], [-l.max.axis(k), -r.max.axis(k)]]);
         }
         Self { root: topology.root, nodes }
     }
@@ -72,9 +72,8 @@ impl<R: Real> Bvh2<R> {
 
 impl<R: Real> Node<R> {
     fn child_box(&self, child: usize) -> Aabb<R> {
-        let [x, y, z] = self.planes;
-        let max = child + 2;
-        Aabb::new(R::Vec3::new(x[child], y[child], z[child]), R::Vec3::new(-x[max], -y[max], -z[max]))
+        let [x, y, z] = self.planes.map(|p| p.map(|side| side[child]));
+        Aabb::new(R::Vec3::new(x[0], y[0], z[0]), R::Vec3::new(-x[1], -y[1], -z[1]))
     }
 }
 
@@ -90,15 +89,13 @@ impl<R: Real> Tree<R> for Bvh2<R> {
         // Where the ray enters both boxes, and minus where it leaves them.
         let mut ends = [t_min, t_min, -t_max, -t_max];
         for axis in 0..3 {
-            let p = node.planes[axis];
             let (near, far) = (ray.near_origin.axis(axis), ray.far_origin.axis(axis));
             let inverse = ray.inverse.axis(axis).abs();
-            // Going down, the upper planes come first; the same way for all nodes that this ray visits.
-            let (p, origin) = if ray.negative[axis] {
-                ([p[2], p[3], p[0], p[1]], [-near, -near, far, far])
-            } else {
-                (p, [near, near, -far, -far])
-            };
+            // Going down, the ray enters through the upper planes. Chosen by index: there is no branch to mispredict.
+            let side = usize::from(ray.negative[axis]);
+            let ([p0, p1], [p2, p3]) = (node.planes[axis][side], node.planes[axis][1 - side]);
+            let p = [p0, p1, p2, p3];
+            let origin = if ray.negative[axis] { [-near, -near, far, far] } else { [near, near, -far, -far] };
             for k in 0..4 {
                 let t = (p[k] - origin[k]) * inverse;
                 // In this form one instruction, and NaN is dropped.

@@ -57,16 +57,14 @@ impl<R: Real> Shear<R> {
         let e0 = cx * by - cy * bx;
         let e1 = ax * cy - ay * cx;
         let e2 = bx * ay - by * ax;
-        let least = e0.min(e1).min(e2);
-        let most = e0.max(e1).max(e2);
-        if least < R::ZERO && most > R::ZERO {
+        let below = e0 < R::ZERO || e1 < R::ZERO || e2 < R::ZERO;
+        let above = e0 > R::ZERO || e1 > R::ZERO || e2 > R::ZERO;
+        if below && above {
             return None;
         }
-        if e0 == R::ZERO || e1 == R::ZERO || e2 == R::ZERO || !(most - least).is_finite() {
-            return exact([(ax, ay), (bx, by), (cx, cy)]);
-        }
         let inverse = R::ONE / (e0 + e1 + e2);
-        if !inverse.is_finite() {
+        // A sum that is infinite or NaN (overflow), or too small for a reciprocal, is left to double precision too.
+        if e0 == R::ZERO || e1 == R::ZERO || e2 == R::ZERO || !(inverse.is_finite() && inverse != R::ZERO) {
             return exact([(ax, ay), (bx, by), (cx, cy)]);
         }
         Some(Weights { u: (e1 * inverse).min(R::ONE), v: (e2 * inverse).min(R::ONE) })
