@@ -72,7 +72,7 @@ pub(crate) enum Command {
     /// Print a manual page (roff).
     Man {
         /// The page of one command instead of the program's.
-        #[arg(value_parser = ["render", "inspect", "completions"])]
+        #[arg(value_parser = ["render", "inspect", "completions", "man"])]
         command: Option<String>,
     },
 }
@@ -177,7 +177,7 @@ pub(crate) struct CameraArgs {
     pub(crate) camera_view_up: Option<DVec3>,
 
     /// Its full vertical angle of view, in degrees
-    #[arg(long, value_name = "DEG", value_parser = values::view_angle)]
+    #[arg(long, value_name = "DEG", value_parser = values::view_angle, allow_hyphen_values = true)]
     pub(crate) camera_view_angle: Option<f64>,
 
     /// Turn it around the focal point, counter-clockwise seen from above
@@ -189,7 +189,7 @@ pub(crate) struct CameraArgs {
     pub(crate) camera_elevation_angle: f64,
 
     /// Above 1: closer
-    #[arg(long, value_name = "F", value_parser = values::positive)]
+    #[arg(long, value_name = "F", value_parser = values::positive, allow_hyphen_values = true)]
     pub(crate) camera_zoom_factor: Option<f64>,
 
     /// Parallel projection

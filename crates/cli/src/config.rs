@@ -4,6 +4,8 @@
 //! (typed) option overrides an earlier one.
 
 use std::ffi::OsString;
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use clap::parser::ValueSource;
@@ -15,6 +17,9 @@ use crate::error::Failure;
 
 /// Read where `--config` names no other file.
 const IMPLICIT: &str = "firsthit.toml";
+
+/// The largest file that is read.
+const MOST_BYTES: u64 = 1 << 20;
 
 /// Options that say where options come from.
 const NO_KEYS: [&str; 3] = ["config", "no-config", "help"];
@@ -37,8 +42,7 @@ pub(crate) fn parse(argv: &[OsString]) -> Result<(Cli, Option<PathBuf>), Stop> {
         None if !args.run.no_config && Path::new(IMPLICIT).is_file() => IMPLICIT.into(),
         None => return Ok((typed, None)),
     };
-    let text = std::fs::read_to_string(&path)
-        .map_err(|e| Stop::Failure(Failure::failed(format_args!("{}: {e}", path.display()))))?;
+    let text = read(&path).map_err(|e| Stop::Failure(Failure::failed(format_args!("{}: {e}", path.display()))))?;
     let configured = arguments(&text, argv).map_err(|cause| {
         let failure = Failure::usage(format_args!("{}: {cause}", path.display()));
         Stop::Failure(
@@ -50,6 +54,18 @@ pub(crate) fn parse(argv: &[OsString]) -> Result<(Cli, Option<PathBuf>), Stop> {
     let merged = head.iter().chain(&configured).chain(tail);
     let cli = Cli::try_parse_from(merged).map_err(Stop::Clap)?;
     Ok((cli, Some(path)))
+}
+
+/// The text of the file. What has no end, or none in sight, is refused.
+fn read(path: &Path) -> io::Result<String> {
+    let refused = |cause: &str| Err(io::Error::new(io::ErrorKind::InvalidInput, cause));
+    // Asked before it is opened: opening a pipe waits for a writer.
+    if !std::fs::metadata(path)?.is_file() {
+        return refused("this is no regular file");
+    }
+    let mut text = String::new();
+    File::open(path)?.take(MOST_BYTES + 1).read_to_string(&mut text)?;
+    if text.len() as u64 > MOST_BYTES { refused("a configuration file has at most 1 MiB") } else { Ok(text) }
 }
 
 /// The file's entries as arguments, but for those that add to a list which the command line begins anew.

@@ -1,5 +1,6 @@
 //! Standard error for messages, standard output for results. A closed pipe is never a panic.
 
+use std::borrow::Cow;
 use std::fmt::Display;
 use std::io::{self, ErrorKind, Write};
 
@@ -66,11 +67,34 @@ impl Console {
         }
         Ok(())
     }
+
+    /// Samples that were no light; an error if `strict`.
+    pub(crate) fn bad_samples(self, count: u64, strict: bool) -> Result<(), Failure> {
+        let text = format!("{} samples were not finite and count as black", grouped(count));
+        match (count, strict) {
+            (0, _) => {}
+            (_, true) => return Err(Failure::failed(format_args!("{text}, taken as an error by --strict"))),
+            (_, false) => self.say(format_args!("warning: {text}")),
+        }
+        Ok(())
+    }
 }
 
-/// Writes a line to standard error, if anyone listens.
-pub(crate) fn message(line: impl Display) {
-    let _ = writeln!(io::stderr().lock(), "{line}");
+/// Writes a message to standard error, if anyone listens. It may quote from files: see [`visible`].
+pub(crate) fn message(text: impl Display) {
+    let mut out = io::stderr().lock();
+    for line in text.to_string().lines() {
+        let _ = writeln!(out, "{}", visible(line));
+    }
+}
+
+/// Text from a file with its control characters escaped, so that it is shown by a terminal and not obeyed.
+pub(crate) fn visible(text: &str) -> Cow<'_, str> {
+    if !text.contains(char::is_control) {
+        return text.into();
+    }
+    let escaped = |c: char| if c.is_control() { c.escape_default().to_string() } else { c.into() };
+    text.chars().map(escaped).collect()
 }
 
 /// Writes to standard output. A reader that has seen enough (`| head`) is no error.
@@ -126,6 +150,24 @@ mod tests {
         assert_eq!([0, 999, 1000, 1_234_567].map(grouped), ["0", "999", "1 000", "1 234 567"]);
         assert_eq!([1, 2000].map(|n| count(n, "shape")), ["1 shape", "2 000 shapes"]);
         assert_eq!([0.0, 9999.0, 12_345.0, 1.5e6, 2e9].map(short), ["0", "9999", "12.3k", "1.50M", "2.00G"]);
+    }
+
+    #[test]
+    fn control_characters_are_shown_not_sent() {
+        assert_eq!(
+            visible("\x1b]0;owned\x07 \u{9b}2J caf\u{e9} \r\n"),
+            "\\u{1b}]0;owned\\u{7} \\u{9b}2J caf\u{e9} \\r\\n"
+        );
+        assert!(matches!(visible("plain \u{1f600}"), Cow::Borrowed(_)));
+    }
+
+    #[test]
+    fn strict_takes_bad_samples_as_an_error() {
+        assert!(Console::Quiet.bad_samples(0, true).is_ok());
+        assert!(Console::Quiet.bad_samples(7, false).is_ok());
+        let error = Console::Quiet.bad_samples(7, true).unwrap_err();
+        assert_eq!(error.exit, crate::error::Exit::Failed);
+        assert!(error.to_string().contains("7 samples"), "{error}");
     }
 
     #[test]

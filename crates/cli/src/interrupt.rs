@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::SeqCst};
 
-use crate::console::message;
+use crate::console::Console;
 use crate::error::Exit;
 
 /// Whether the user wants to stop.
@@ -17,7 +17,7 @@ pub(crate) struct Interrupt {
 impl Interrupt {
     /// Listens for Ctrl-C from now on. SIGTERM and SIGHUP keep their meaning: `nohup` works, and an image is written
     /// whole or not at all anyway.
-    pub(crate) fn listen() -> Self {
+    pub(crate) fn listen(console: Console) -> Self {
         let interrupt = Self::default();
         let heard = interrupt.clone();
         // Without a handler Ctrl-C still ends the program: nothing to report.
@@ -26,7 +26,7 @@ impl Interrupt {
             if again || !heard.rendering.load(SeqCst) {
                 std::process::exit(Exit::Interrupted as i32);
             }
-            message("\ninterrupted: writing the image so far (again: quit at once)");
+            console.say("\ninterrupted: writing the image so far (again: quit at once)");
         });
         interrupt
     }

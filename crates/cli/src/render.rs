@@ -1,27 +1,26 @@
 //! `firsthit render`: from a model to an image.
 
-use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
 use firsthit_accel::{BuildOptions, SceneBuilder};
-use firsthit_import::Imported;
 use firsthit_import::scene::Settings;
+use firsthit_import::{Imported, Report};
 use firsthit_render::{
     Background, CameraChanges, Clip, RenderOptions, Rendered, Stage, StageOptions, View, ViewTransform,
     output::{BitDepth, WriteOptions, write_film, write_png},
 };
 
 use crate::args::{CameraArgs, RenderArgs};
-use crate::console::{Console, grouped, message, print_json};
+use crate::console::{Console, message, print, print_json};
 use crate::error::{Exit, Failure};
 use crate::hdri;
 use crate::interrupt::Interrupt;
 use crate::progress::{Progress, Style};
 use crate::report::{Counts, RenderReport, Seconds, effects, explain_effects, rays_in_words, warnings};
 use crate::target::Target;
-use crate::values::Resolution;
+use crate::values::{Hdri, Resolution};
 
 /// Renders a model as the arguments say.
 pub(crate) fn run(args: &RenderArgs, config: Option<&Path>) -> Result<Exit, Failure> {
@@ -43,13 +42,15 @@ pub(crate) fn run(args: &RenderArgs, config: Option<&Path>) -> Result<Exit, Fail
         pool = pool.num_threads(threads.into());
     }
     let pool = pool.build().map_err(|e| Failure::failed(format_args!("threads: {e}")))?;
-    let interrupt = Interrupt::listen();
-    pool.install(|| Job { args, console, target, interrupt }.run())
+    let interrupt = Interrupt::listen(console);
+    pool.install(|| Job { args, config, console, target, interrupt }.run())
 }
 
 /// One render.
 struct Job<'a> {
     args: &'a RenderArgs,
+    /// The configuration file that was read.
+    config: Option<&'a Path>,
     console: Console,
     target: Target,
     interrupt: Interrupt,
@@ -65,7 +66,9 @@ impl Job<'_> {
         let options = firsthit_import::Options { up: args.scene.up, ..Default::default() };
         let Imported { scene, report } = firsthit_import::open(&args.model, &options)?;
         self.console.warnings(&report, args.run.strict)?;
+        self.spare_what_was_read(&report)?;
         let options = render_options(args, &scene.settings)?;
+        options.check().map_err(|e| self.at_model(&e))?;
         let stage_options = stage_options(args, &options, &self.target)?;
         seconds.load = started.elapsed().as_secs_f64();
 
@@ -95,10 +98,6 @@ impl Job<'_> {
         let files = self.write(&rendered)?;
         seconds.write = started.elapsed().as_secs_f64();
 
-        let bad = rendered.stats.bad_samples;
-        if bad > 0 {
-            self.console.say(format_args!("warning: {} samples were not finite and count as black", grouped(bad)));
-        }
         if args.run.explain {
             explain_effects(&rendered.effects).iter().for_each(message);
         }
@@ -130,7 +129,20 @@ impl Job<'_> {
                 more_warnings: report.more_warnings,
             })?;
         }
+        // The picture is there to be looked at, whatever is said about it.
+        self.console.bad_samples(rendered.stats.bad_samples, args.run.strict)?;
         Ok(if rendered.interrupted { Exit::Interrupted } else { Exit::Done })
+    }
+
+    /// Refuses to write over a file that this render was made from.
+    fn spare_what_was_read(&self, report: &Report) -> Result<(), Failure> {
+        let hdri = match &self.args.scene.hdri {
+            Some(Hdri::File(path)) => Some(path.as_path()),
+            _ => None,
+        };
+        let aovs = self.args.output.aov.as_ref().map_or(&[][..], |list| &list.0);
+        let read = report.files.iter().map(PathBuf::as_path);
+        self.target.spare(aovs, read.chain(hdri).chain(self.config))
     }
 
     /// Writes the image and what belongs to it; the answer: the files, the image first.
@@ -150,10 +162,9 @@ impl Job<'_> {
                 write_film(path, &rendered.film, &WriteOptions { view, bit_depth }).map_err(Failure::failed)
             }
             Target::Stdout => {
-                let mut out = BufWriter::new(io::stdout().lock());
-                write_png(&mut out, &rendered.film.color(), &view, bit_depth)
-                    .and_then(|()| out.flush())
-                    .map_err(|e| Failure::failed(format_args!("standard output: {e}")))?;
+                let mut png = Vec::new();
+                write_png(&mut png, &rendered.film.color(), &view, bit_depth).map_err(Failure::failed)?;
+                print(&png)?;
                 Ok(Vec::new())
             }
         }

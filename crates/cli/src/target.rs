@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use firsthit_render::output::Format;
+use firsthit_render::Aov;
+use firsthit_render::output::{self, Format};
 
 use crate::error::Failure;
 
@@ -31,7 +32,24 @@ impl Target {
             let failure = Failure::failed(format_args!("{}: there is no folder {}", path.display(), folder.display()));
             return Err(failure.hint(format_args!("mkdir -p {}", folder.display())));
         }
+        output::try_path(&path).map_err(Failure::failed)?;
         Ok(Self::File(path, format))
+    }
+
+    /// Refuses if writing would replace one of the files that were read.
+    pub(crate) fn spare<'a>(&self, aovs: &[Aov], read: impl Iterator<Item = &'a Path>) -> Result<(), Failure> {
+        let Self::File(path, _) = self else { return Ok(()) };
+        let written = output::files(path, aovs).map_err(Failure::usage)?;
+        // What does not exist yet replaces nothing.
+        let existing: Vec<_> = written.iter().filter_map(|f| Some((f, f.canonicalize().ok()?))).collect();
+        let read: Vec<_> = if existing.is_empty() { Vec::new() } else { read.flat_map(Path::canonicalize).collect() };
+        match existing.iter().find(|(_, full)| read.contains(full)) {
+            Some((file, _)) => {
+                let failure = format_args!("{}: the model was read from this file too", file.display());
+                Err(Failure::failed(failure).hint("write to another file: -o FILE"))
+            }
+            None => Ok(()),
+        }
     }
 
     /// Whether it shows what a display shows, instead of radiance.
@@ -48,18 +66,20 @@ impl Target {
     }
 }
 
-/// `models/helmet.glb` is rendered to `helmet.png`, `scan.obj.zst` to `scan.png`; `scene.json` says nothing, so its
-/// folder's name is taken.
+/// `models/helmet.glb` is rendered to `helmet.png`, `scan.obj.zst` to `scan.png`, the folder `v1.2` to `v1.2.png`;
+/// `scene.json` says nothing, so its folder's name is taken.
 fn default_name(model: &Path) -> PathBuf {
-    let file = model.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-    let stem = if file == "scene.json" || file.is_empty() { None } else { strip_extensions(&file) };
-    let folder = || {
-        let full = std::path::absolute(model).ok()?;
-        let folder = if file.is_empty() { full.as_path() } else { full.parent()? };
-        Some(folder.file_name()?.to_string_lossy().into_owned())
+    let name = |path: &Path| Some(path.file_name()?.to_string_lossy().into_owned());
+    let stem = if model.is_dir() {
+        // `.` and `..` have a name only in full.
+        model.canonicalize().ok().as_deref().and_then(name)
+    } else {
+        match name(model) {
+            Some(file) if file != "scene.json" => strip_extensions(&file),
+            _ => std::path::absolute(model).ok().as_deref().and_then(Path::parent).and_then(name),
+        }
     };
-    let stem = stem.or_else(folder).unwrap_or_else(|| "image".into());
-    PathBuf::from(format!("{stem}.png"))
+    PathBuf::from(format!("{}.png", stem.unwrap_or_else(|| "image".into())))
 }
 
 /// The name without its extension, nor that of a compressed file inside it.
@@ -81,11 +101,43 @@ mod tests {
             ("a/scan.obj.zst", "scan.png"),
             ("a/v1.2/part.v3.obj", "part.v3.png"),
             ("a/cornell/scene.json", "cornell.png"),
-            ("a/cornell/", "cornell.png"),
             ("/", "image.png"),
         ] {
             assert_eq!(default_name(Path::new(model)), Path::new(image), "{model}");
         }
+    }
+
+    #[test]
+    fn the_image_of_a_folder_has_its_whole_name() {
+        let parent = tempfile::tempdir().unwrap();
+        let folder = parent.path().join("mm.v2");
+        std::fs::create_dir_all(folder.join("sub")).unwrap();
+        for model in
+            [folder.clone(), folder.join(""), folder.join("."), folder.join("sub/.."), folder.join("scene.json")]
+        {
+            assert_eq!(default_name(&model), Path::new("mm.v2.png"), "{}", model.display());
+        }
+    }
+
+    #[test]
+    fn what_was_read_is_not_written_over() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        for name in ["cow.png", "cow.depth.exr"] {
+            std::fs::write(path(name), "").unwrap();
+        }
+        std::fs::create_dir(path("sub")).unwrap();
+        let spare = |target: &str, aovs: &[Aov], read: &str| {
+            Target::new(Some(&path(target)), Path::new("m.obj"))
+                .unwrap()
+                .spare(aovs, [path(read).as_path()].into_iter())
+        };
+        let error = spare("cow.png", &[], "sub/../cow.png").unwrap_err().to_string();
+        assert!(error.contains("cow.png") && error.contains("-o FILE"), "{error}");
+        assert!(spare("cow.png", &[Aov::Depth], "cow.depth.exr").is_err());
+        assert!(spare("cow.png", &[Aov::Normal], "cow.depth.exr").is_ok());
+        assert!(spare("cow.exr", &[Aov::Depth], "cow.depth.exr").is_ok(), "an .exr holds all");
+        assert!(spare("new.png", &[], "cow.png").is_ok());
     }
 
     #[test]

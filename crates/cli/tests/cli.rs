@@ -1,5 +1,7 @@
 //! The program as a user meets it: exit codes, streams, files, messages.
 
+#[cfg(unix)]
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
@@ -167,6 +169,8 @@ fn what_cannot_work_is_refused_before_anything_is_loaded() {
     render(&["-o", "image.xyz"]).fails(2, &["image.xyz", ".png"]);
     render(&["-o", "image"]).fails(2, &[".png"]);
     render(&["-o", "missing/image.png"]).fails(1, &["missing", "mkdir"]);
+    // There is no room for so long a name.
+    render(&["-o", &format!("{}.png", "x".repeat(300))]).fails(1, &["cannot write"]);
     assert_eq!(folder.files(), ["cube.mtl", "cube.obj"]);
 }
 
@@ -185,10 +189,13 @@ fn wrong_usage_exits_with_2() {
         &["render", "cube.obj", "--bit-depth", "12"],
         &["render", "cube.obj", "--crop", "0,0,9999,1"],
         &["render", "cube.obj", "--up", "W"],
+        &["render", "cube.obj", "--camera-zoom-factor", "-1"],
         &["render", "cube.obj", "extra.obj"],
     ] {
         folder.run(args).fails(2, &[]);
     }
+    folder.run(&["render", "cube.obj", "--camera-zoom-factor", "-1"]).fails(2, &["expected a number above 0"]);
+    folder.run(&["render", "cube.obj", "--camera-view-angle", "-20"]).fails(2, &["expected degrees"]);
     folder.run(&[]).code(2);
     folder.run(&["cube.obj"]).fails(2, &["hint: to render a model: firsthit render cube.obj"]);
     assert_eq!(folder.files(), ["cube.mtl", "cube.obj"]);
@@ -215,6 +222,76 @@ fn a_failed_render_leaves_the_old_image_alone() {
     assert_eq!(std::fs::read(folder.path("old.png")).unwrap(), b"old");
     folder.render(&["-o", "old.png"]).code(0);
     assert_eq!(png_file(&folder.path("old.png")), (32, 18, 8));
+}
+
+#[test]
+fn a_file_that_was_read_is_not_written_over() {
+    let folder = Folder::new();
+    // The model's own texture has the name that the image would get.
+    folder.render(&[]).code(0);
+    folder.write("cube.mtl", "newmtl red\nmap_Kd cube.png\n");
+    let texture = std::fs::read(folder.path("cube.png")).unwrap();
+    folder.render(&[]).fails(1, &["cube.png", "hint", "-o FILE"]);
+    folder.render(&["-o", "./cube.png"]).fails(1, &["cube.png"]);
+    assert!(std::fs::read(folder.path("cube.png")).unwrap() == texture);
+    folder.render(&["-o", "other.png"]).code(0);
+
+    folder.render(&["-o", "sky.exr"]).code(0);
+    folder.render(&["-o", "sky.exr", "--hdri", "sky.exr"]).fails(1, &["sky.exr"]);
+    std::fs::rename(folder.path("sky.exr"), folder.path("new.depth.exr")).unwrap();
+    let beside = ["-o", "new.png", "--aov", "depth", "--hdri", "new.depth.exr"];
+    folder.render(&beside).fails(1, &["new.depth.exr"]);
+    assert!(!folder.path("new.png").exists());
+}
+
+#[test]
+fn a_picture_too_large_for_memory_is_refused_wherever_its_size_is_given() {
+    let folder = Folder::new();
+    folder.write("huge.toml", "film = { width = 16384, height = 16384 }\n");
+    folder.run(&["render", "huge.toml"]).fails(1, &["huge.toml", "too large"]);
+    folder.render(&["--resolution", "99999x99999"]).fails(1, &["too large"]);
+    folder.render(&["--resolution", "99999x99999", "--crop", "40000,40000,8,8"]).code(0);
+}
+
+#[test]
+fn samples_that_are_no_light_fail_a_strict_render() {
+    let folder = Folder::new();
+    // So strong that f32 has no number for what arrives.
+    folder.write(
+        "burnt.toml",
+        "camera = { origin = [0, 0, 5], target = [0, 0, 0] }\n\
+         env = { type = \"constant\", radiance = 3e38 }\n\
+         objects = [{ shape = \"sphere\", center = [0, 0, 0], radius = 1 }]\n",
+    );
+    let render = |args: &[&str]| folder.run(&[&["render", "burnt.toml", "--resolution=32x18", "-s1"], args].concat());
+    let run = render(&[]).code(0);
+    assert!(run.stderr().contains("warning: ") && run.stderr().contains("not finite"), "{}", run.stderr());
+    render(&["--strict"]).fails(1, &["not finite", "--strict"]);
+}
+
+#[test]
+fn control_characters_in_files_do_not_reach_the_terminal() {
+    let folder = Folder::new();
+    folder.write("cube.mtl", "newmtl red\nKd 1 1 1\nstrange\x1b]0;title\x07 1\n");
+    folder.write(
+        "named.gltf",
+        r#"{"asset": {"version": "2.0"}, "cameras": [{"name": "\u001b[2J\n\u009bm",
+        "type": "perspective", "perspective": {"yfov": 1, "znear": 1}}], "nodes": [{"camera": 0}],
+        "scenes": [{"nodes": [0]}], "scene": 0}"#,
+    );
+    let runs = [
+        folder.render(&["-v"]),
+        folder.render(&["--hdri", "\x1b[2Jsky.hdr"]),
+        folder.run(&["inspect", "cube.obj"]),
+        folder.run(&["inspect", "named.gltf"]),
+        folder.run(&["render", "named.gltf", "--camera", "nobody"]),
+    ];
+    for run in runs {
+        let text = run.stdout() + &run.stderr();
+        assert!(!text.contains(|c: char| c.is_control() && c != '\n'), "{text:?}");
+    }
+    let listed = folder.run(&["inspect", "named.gltf"]).code(0).stdout();
+    assert!(listed.contains("\\u{1b}[2J\\n"), "{listed}");
 }
 
 #[test]
@@ -394,6 +471,11 @@ fn the_configuration_file_comes_before_the_command_line() {
     folder.write("firsthit.toml", "camera_position = [1, 2, 3]\n");
     folder.run(&["render", "cube.obj"]).fails(2, &["firsthit.toml", "camera-position", "--no-config"]);
     folder.run(&["render", "cube.obj", "--config", "missing.toml"]).fails(1, &["missing.toml"]);
+    folder.run(&["render", "cube.obj", "--config", "."]).fails(1, &["no regular file"]);
+    folder.write("long.toml", &"#".repeat((1 << 20) + 1));
+    folder.run(&["render", "cube.obj", "--config", "long.toml"]).fails(1, &["long.toml", "1 MiB"]);
+    #[cfg(unix)]
+    folder.run(&["render", "cube.obj", "--config", "/dev/zero"]).fails(1, &["/dev/zero"]);
 }
 
 #[test]
@@ -507,12 +589,20 @@ fn completions_and_manual_come_from_the_same_definitions() {
     assert!(manual.contains(".TH") && manual.contains("render"));
     let page = folder.run(&["man", "render"]).code(0).stdout();
     assert!(page.contains("\\-\\-camera\\-focal\\-point") && page.contains("firsthit"));
+    for command in ["inspect", "completions", "man"] {
+        assert!(folder.run(&["man", command]).code(0).stdout().contains(".TH"), "{command}");
+    }
 }
 
 #[test]
 fn a_closed_pipe_is_no_panic() {
     let folder = Folder::new();
-    for args in [&["inspect", "cube.obj", "--json"][..], &["render", "--help"], &["completions", "zsh"]] {
+    for args in [
+        &["inspect", "cube.obj", "--json"][..],
+        &["render", "--help"],
+        &["completions", "zsh"],
+        &["render", "cube.obj", "-q", "-s1", "--resolution=300x300", "-o", "-"],
+    ] {
         let mut child = folder.command(args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         drop(child.stdout.take());
         let run = Run(child.wait_with_output().unwrap());
@@ -528,8 +618,21 @@ fn a_closed_pipe_is_no_panic() {
 
 #[cfg(unix)]
 #[test]
+fn a_quiet_render_is_interrupted_in_silence() {
+    let folder = Folder::new();
+    let args = ["render", "cube.obj", "--resolution=64x48", "-s", "1000000", "--quiet", "--progress"];
+    let mut child = folder.command(&args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
+    assert!(lines.by_ref().any(|line| line.starts_with("rendering: ")));
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let rest: Vec<String> = lines.filter(|line| !line.starts_with("rendering: ")).collect();
+    assert_eq!((child.wait().unwrap().code(), rest), (Some(130), Vec::new()));
+    assert_eq!(png_file(&folder.path("cube.png")), (64, 48, 8));
+}
+
+#[cfg(unix)]
+#[test]
 fn an_interrupted_render_writes_the_image_so_far() {
-    use std::io::{BufRead, BufReader};
     let folder = Folder::new();
     // Hours of work, but for the interruption.
     let args = ["render", "cube.obj", "--resolution=640x480", "-s", "1000000", "--progress", "--json"];

@@ -1,5 +1,7 @@
 //! The film: sums of samples, pixel by pixel.
 
+use std::collections::TryReserveError;
+
 use rayon::prelude::*;
 
 use crate::{Aov, Crop};
@@ -56,10 +58,11 @@ impl Accumulator {
 ///
 /// ```
 /// use firsthit_render::Film;
-/// let mut film = Film::new(2, 1, None, &[]);
+/// let mut film = Film::new(2, 1, None, &[])?;
 /// let mut band = film.bands_mut(8).next().unwrap();
 /// band.pixel(1, 0)[0].add([0.5, 0.25, 0.0, 1.0]);
 /// assert_eq!(film.color().pixels, [[0.0; 4], [0.5, 0.25, 0.0, 1.0]]);
+/// # Ok::<(), std::collections::TryReserveError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Film {
@@ -92,21 +95,26 @@ pub struct Picture {
 
 impl Film {
     /// An empty film for a picture of `width` x `height` pixels. A crop window is cut to the picture.
+    ///
+    /// # Errors
+    /// When there is not enough memory, see [`Film::bytes`].
+    pub fn new(width: u32, height: u32, crop: Option<Crop>, aovs: &[Aov]) -> Result<Self, TryReserveError> {
+        let window = held(width, height, crop);
+        let aovs = each_once(aovs);
+        let count = (window.width as usize).saturating_mul(window.height as usize).saturating_mul(1 + aovs.len());
+        let mut pixels = Vec::new();
+        pixels.try_reserve_exact(count)?;
+        pixels.resize(count, Accumulator::default());
+        Ok(Self { size: (width, height), window, aovs, pixels })
+    }
+
+    /// The memory that [`Film::new`] would take with the same arguments, in bytes.
     #[must_use]
-    pub fn new(width: u32, height: u32, crop: Option<Crop>, aovs: &[Aov]) -> Self {
-        let whole = Crop { x: 0, y: 0, width, height };
-        let window = crop.map_or(whole, |c| {
-            let (x, y) = (c.x.min(width), c.y.min(height));
-            Crop { x, y, width: c.width.min(width - x), height: c.height.min(height - y) }
-        });
-        let mut unique: Vec<Aov> = Vec::new();
-        for aov in aovs {
-            if !unique.contains(aov) {
-                unique.push(*aov);
-            }
-        }
-        let count = window.width as usize * window.height as usize * (1 + unique.len());
-        Self { size: (width, height), window, aovs: unique, pixels: vec![Accumulator::default(); count] }
+    pub fn bytes(width: u32, height: u32, crop: Option<Crop>, aovs: &[Aov]) -> u64 {
+        let window = held(width, height, crop);
+        let layer =
+            (u64::from(window.width) * u64::from(window.height)).saturating_mul(size_of::<Accumulator>() as u64);
+        layer.saturating_mul(1 + each_once(aovs).len() as u64)
     }
 
     /// Width and height of the whole picture, of which [`Film::window`] is held.
@@ -207,6 +215,23 @@ impl Band<'_> {
     }
 }
 
+/// A crop window cut to the picture; without one, the whole picture.
+fn held(width: u32, height: u32, crop: Option<Crop>) -> Crop {
+    let crop = crop.unwrap_or(Crop { x: 0, y: 0, width, height });
+    let (x, y) = (crop.x.min(width), crop.y.min(height));
+    Crop { x, y, width: crop.width.min(width - x), height: crop.height.min(height - y) }
+}
+
+fn each_once(aovs: &[Aov]) -> Vec<Aov> {
+    let mut unique = Vec::new();
+    for aov in aovs {
+        if !unique.contains(aov) {
+            unique.push(*aov);
+        }
+    }
+    unique
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -249,7 +274,7 @@ mod tests {
     #[test]
     fn bands_cover_every_pixel_of_the_window_once() {
         for (crop, rows) in [(None, 4), (Some(Crop { x: 3, y: 5, width: 6, height: 100 }), 3), (None, 100)] {
-            let mut film = Film::new(10, 12, crop, &[Aov::Normal]);
+            let mut film = Film::new(10, 12, crop, &[Aov::Normal]).unwrap();
             film.par_bands_mut(rows).for_each(|mut band| {
                 for y in band.rows() {
                     for x in band.columns() {
@@ -271,7 +296,7 @@ mod tests {
 
     #[test]
     fn other_pictures_are_means_over_what_was_hit() {
-        let mut film = Film::new(2, 1, None, &[Aov::Depth, Aov::Normal, Aov::Depth]);
+        let mut film = Film::new(2, 1, None, &[Aov::Depth, Aov::Normal, Aov::Depth]).unwrap();
         assert_eq!(film.aovs(), [Aov::Depth, Aov::Normal]);
         let mut band = film.bands_mut(1).next().unwrap();
         band.pixel(0, 0)[1].add([3.0, 3.0, 3.0, 1.0]);
@@ -284,9 +309,24 @@ mod tests {
     }
 
     #[test]
+    fn more_than_memory_holds_is_an_error() {
+        let all = Film::new(u32::MAX, u32::MAX, None, &Aov::ALL);
+        assert!(all.is_err());
+        assert_eq!(Film::bytes(u32::MAX, u32::MAX, None, &Aov::ALL), u64::MAX, "nothing wraps around");
+    }
+
+    #[test]
+    fn only_what_is_held_takes_memory() {
+        let film = Film::new(100, 100, Some(Crop { x: 95, y: 0, width: 10, height: 3 }), &[Aov::Uv, Aov::Uv]).unwrap();
+        let bytes = Film::bytes(100, 100, Some(Crop { x: 95, y: 0, width: 10, height: 3 }), &[Aov::Uv, Aov::Uv]);
+        assert_eq!(bytes, size_of_val(film.pixels.as_slice()) as u64);
+        assert_eq!(bytes, 5 * 3 * 2 * size_of::<Accumulator>() as u64);
+    }
+
+    #[test]
     fn a_window_outside_the_picture_is_empty() {
-        let film = Film::new(4, 4, Some(Crop { x: 9, y: 0, width: 5, height: 5 }), &[]);
+        let film = Film::new(4, 4, Some(Crop { x: 9, y: 0, width: 5, height: 5 }), &[]).unwrap();
         assert_eq!((film.window().width, film.color().pixels.len()), (0, 0));
-        assert_eq!(Film::new(0, 0, None, &[]).clone().bands_mut(8).count(), 0);
+        assert_eq!(Film::new(0, 0, None, &[]).unwrap().bands_mut(8).count(), 0);
     }
 }

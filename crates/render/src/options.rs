@@ -1,5 +1,6 @@
 //! What the caller wants of a picture.
 
+use firsthit_import::scene::ImageDesc;
 use glam::{DVec3, Vec3};
 
 use crate::{Aov, EffectSet};
@@ -83,7 +84,7 @@ pub struct Clip {
 }
 
 /// What a stage is set up with beside the scene.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct StageOptions {
     /// Light from around.
     pub environment: EnvironmentChoice,
@@ -116,7 +117,7 @@ impl Default for StageOptions {
 }
 
 /// Light from around the scene.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default)]
 pub enum EnvironmentChoice {
     /// The scene's own; else, where the scene has no lights, the studio.
     #[default]
@@ -127,15 +128,9 @@ pub enum EnvironmentChoice {
     White,
     /// None.
     Black,
-    /// A map by longitude and latitude, linear RGB, row 0 at +Y.
-    Map {
-        /// Pixels across.
-        width: u32,
-        /// Pixels down.
-        height: u32,
-        /// Radiance.
-        pixels: std::sync::Arc<[[f32; 3]]>,
-    },
+    /// A map by longitude and latitude, row 0 at +Y. Floats are radiance; 8 and 16 bits are taken as sRGB, their white
+    /// as radiance 1.
+    Map(ImageDesc),
 }
 
 /// What the camera sees where there is nothing.

@@ -24,8 +24,8 @@ use crate::{
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RenderError {
-    /// No pixels, or too many to address.
-    #[error("the picture cannot be {width} x {height} pixels (1 to 2^28 in all)")]
+    /// No pixels.
+    #[error("the picture cannot be {width} x {height} pixels")]
     Size {
         /// Width asked for.
         width: u32,
@@ -38,6 +38,36 @@ pub enum RenderError {
     /// The crop window has no pixel in the picture.
     #[error("the crop window lies outside the picture")]
     EmptyCrop,
+    /// The film would take more than [`RenderOptions::MOST_FILM_BYTES`], or more than there is.
+    #[error("the picture is too large: it takes {} MiB of memory", bytes.div_ceil(1 << 20))]
+    Memory {
+        /// What it would take.
+        bytes: u64,
+    },
+}
+
+impl RenderOptions {
+    /// Most bytes of a film with all its pictures: some 150 million pixels of colour alone.
+    pub const MOST_FILM_BYTES: u64 = 8 << 30;
+
+    /// Whether they describe a picture. [`render`] checks it too; this is for asking before a scene is prepared.
+    ///
+    /// # Errors
+    /// When they do not: see [`RenderError`].
+    pub fn check(&self) -> Result<(), RenderError> {
+        let (width, height) = (self.width, self.height);
+        if width == 0 || height == 0 {
+            return Err(RenderError::Size { width, height });
+        }
+        if self.spp == 0 {
+            return Err(RenderError::NoSamples);
+        }
+        match Film::bytes(width, height, self.crop, &self.aovs) {
+            0 => Err(RenderError::EmptyCrop),
+            bytes if bytes > Self::MOST_FILM_BYTES => Err(RenderError::Memory { bytes }),
+            _ => Ok(()),
+        }
+    }
 }
 
 /// A finished render, or as much of it as was done when it was cancelled.
@@ -75,17 +105,10 @@ pub fn render<M: Monitor + ?Sized>(
     options: &RenderOptions,
     monitor: &M,
 ) -> Result<Rendered, RenderError> {
-    let (width, height) = (options.width, options.height);
-    if width == 0 || height == 0 || u64::from(width) * u64::from(height) > 1 << 28 {
-        return Err(RenderError::Size { width, height });
-    }
-    if options.spp == 0 {
-        return Err(RenderError::NoSamples);
-    }
-    let mut film = Film::new(width, height, options.crop, &options.aovs);
-    if film.window().width == 0 || film.window().height == 0 {
-        return Err(RenderError::EmptyCrop);
-    }
+    options.check()?;
+    let RenderOptions { width, height, crop, ref aovs, .. } = *options;
+    let mut film = Film::new(width, height, crop, aovs)
+        .map_err(|_| RenderError::Memory { bytes: Film::bytes(width, height, crop, aovs) })?;
     let start = Instant::now();
     let effects = stage.plan().simulated();
     // Chosen once: the rest is compiled for what the scene calls for.
@@ -301,5 +324,22 @@ fn region(clip: &Clip) -> ClipRegion<f64> {
     ClipRegion {
         bounds: clip.bounds.map(|(a, b)| Aabb::new(a.min(b), a.max(b))),
         half_spaces: clip.planes.iter().map(|(normal, offset)| HalfSpace::new(*normal, *offset)).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Crop;
+
+    #[test]
+    fn memory_is_limited_for_all_pictures_together() {
+        let check = |aovs: &[Aov], crop| {
+            RenderOptions { width: 1 << 14, height: 1 << 13, crop, aovs: aovs.to_vec(), ..Default::default() }.check()
+        };
+        assert_eq!(check(&[], None), Ok(()));
+        assert!(matches!(check(&[Aov::Depth], None), Err(RenderError::Memory { bytes }) if bytes > 8 << 30));
+        // A poster may be rendered in parts.
+        assert_eq!(check(&Aov::ALL, Some(Crop { x: 0, y: 0, width: 1 << 14, height: 64 })), Ok(()));
     }
 }

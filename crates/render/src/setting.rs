@@ -1,7 +1,7 @@
 //! What surrounds the scene: chosen from the file, the caller's wish, or the built-in studio.
 
 use firsthit_import::SceneDesc;
-use firsthit_import::scene::{EnvironmentDesc, MaterialModel, Pixels};
+use firsthit_import::scene::{EnvironmentDesc, ImageDesc, MaterialModel, Pixels};
 use glam::Vec3;
 
 use crate::stage::{Backdrop, StageError};
@@ -53,10 +53,7 @@ pub(crate) fn choose(scene: &SceneDesc, options: &StageOptions) -> Result<Settin
         }
         EnvironmentChoice::White => (Some(Environment::constant(Vec3::ONE)), "white, as asked"),
         EnvironmentChoice::Black => (None, "black, as asked"),
-        EnvironmentChoice::Map { width, height, pixels } => {
-            let map = Environment::latlong(*width, *height, pixels.clone(), rotation, Vec3::ONE)?;
-            (Some(map), "the map given")
-        }
+        EnvironmentChoice::Map(image) => (Some(map(image, rotation, Vec3::ONE)?), "the map given"),
     };
     Ok(Setting {
         background: Backdrop::new(options.background, studio),
@@ -84,11 +81,15 @@ fn from_desc(scene: &SceneDesc, desc: &EnvironmentDesc, turn: f32) -> Result<Opt
         EnvironmentDesc::Constant { radiance } => Some(Environment::constant(radiance)),
         EnvironmentDesc::LatLong { image, rotation, scale } => {
             let image = scene.images.get(image).ok_or(StageError::NoSuchImage(image))?;
-            let pixels = linear_pixels(&image.pixels);
-            Some(Environment::latlong(image.width, image.height, pixels, rotation + turn, scale)?)
+            Some(map(image, rotation + turn, scale)?)
         }
         EnvironmentDesc::Studio { rotation, scale } => Some(Environment::studio(rotation + turn, scale)),
     })
+}
+
+fn map(image: &ImageDesc, rotation: f32, scale: Vec3) -> Result<Environment, StageError> {
+    Environment::latlong(image.width, image.height, linear_pixels(&image.pixels), rotation, scale)
+        .map_err(|cause| StageError::Environment { image: image.name.clone(), cause })
 }
 
 /// Linear RGB; 8- and 16-bit images are taken as sRGB.
@@ -98,5 +99,46 @@ fn linear_pixels(pixels: &Pixels) -> std::sync::Arc<[[f32; 3]]> {
         Pixels::Rgb32F(p) => p.clone(),
         Pixels::Rgba8(p) => p.iter().map(|p| [p[0], p[1], p[2]].map(|x| decode(f32::from(x) / 255.0))).collect(),
         Pixels::Rgba16(p) => p.iter().map(|p| [p[0], p[1], p[2]].map(|x| decode(f32::from(x) / 65535.0))).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+
+    fn image(pixels: Pixels) -> ImageDesc {
+        ImageDesc { name: "sky.exr".into(), width: 2, height: 1, pixels }
+    }
+
+    fn of_scene(image: ImageDesc) -> SceneDesc {
+        let environment = EnvironmentDesc::LatLong { image: 0, rotation: 0.0, scale: Vec3::ONE };
+        SceneDesc { images: vec![image], environment: Some(environment), ..SceneDesc::default() }
+    }
+
+    fn as_option(image: ImageDesc) -> StageOptions {
+        StageOptions { environment: EnvironmentChoice::Map(image), ..StageOptions::default() }
+    }
+
+    #[test]
+    fn a_map_that_is_no_light_is_an_error_from_the_file_as_from_the_options() {
+        let bad = image(Pixels::Rgb32F(Arc::new([[1.0; 3], [0.5, f32::NAN, 0.5]])));
+        let of_file = choose(&of_scene(bad.clone()), &StageOptions::default());
+        for result in [of_file, choose(&SceneDesc::default(), &as_option(bad))] {
+            let error = result.err().unwrap().to_string();
+            assert!(error.starts_with("sky.exr: pixel (1, 0)"), "{error}");
+        }
+    }
+
+    #[test]
+    fn images_of_eight_and_sixteen_bits_are_srgb() {
+        let eight = image(Pixels::Rgba8(Arc::new([[128; 4]; 2])));
+        let sixteen = image(Pixels::Rgba16(Arc::new([[128 * 257; 4]; 2])));
+        for image in [eight, sixteen] {
+            let setting = choose(&SceneDesc::default(), &as_option(image)).unwrap();
+            let radiance = setting.environment.unwrap().radiance(Vec3::X);
+            assert!((radiance - Vec3::splat(0.215_861)).length() < 1e-5, "{radiance}");
+        }
     }
 }

@@ -40,8 +40,14 @@ pub enum StageError {
     #[error("image {0} does not exist")]
     NoSuchImage(usize),
     /// The environment map is unusable.
-    #[error(transparent)]
-    Environment(#[from] EnvironmentError),
+    #[error("{image}: {cause}")]
+    Environment {
+        /// The name of its image.
+        image: String,
+        /// What is wrong with it.
+        #[source]
+        cause: EnvironmentError,
+    },
 }
 
 fn available(cameras: &[String]) -> String {

@@ -52,7 +52,7 @@ pub(crate) fn accel(scene: &SceneDesc) -> firsthit_accel::Scene {
 /// A stage without the built-in studio: what the scene does not bring is black.
 pub(crate) fn stage(scene: &Arc<SceneDesc>, options: &StageOptions) -> Stage {
     let mut options = options.clone();
-    if scene.environment.is_none() && options.environment == EnvironmentChoice::Auto {
+    if scene.environment.is_none() && matches!(options.environment, EnvironmentChoice::Auto) {
         options.environment = EnvironmentChoice::Black;
     }
     Stage::new(scene.clone(), accel(scene), &options).unwrap()

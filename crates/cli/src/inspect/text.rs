@@ -3,14 +3,14 @@
 use std::fmt;
 
 use super::{Bounds, Inspection, Mesh};
-use crate::console::{count, grouped};
+use crate::console::{count, grouped, visible};
 
 /// Entries of each list that are printed; JSON has all.
 const SHOWN: usize = 16;
 
 impl fmt::Display for Inspection<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{}", self.model)?;
+        writeln!(f, "{}", visible(&self.model))?;
         let row = |f: &mut fmt::Formatter<'_>, name: &str, value: String| writeln!(f, "  {name:11} {value}");
 
         let mut triangles = grouped(self.triangles);
@@ -60,11 +60,11 @@ impl fmt::Display for Inspection<'_> {
         list(f, &called.collect::<Vec<_>>(), |e| (e.name, e.by_in_words()))?;
         row(f, "by default", "as `render` without options".into())?;
         for choice in self.choices {
-            writeln!(f, "    {choice}")?;
+            writeln!(f, "    {}", visible(choice))?;
         }
         row(f, "warnings", grouped(self.warnings.len() as u64 + self.more_warnings))?;
         for warning in self.warnings.iter().take(SHOWN) {
-            writeln!(f, "    {warning}")?;
+            writeln!(f, "    {}", visible(warning))?;
         }
         more(f, self.warnings.len() as u64 + self.more_warnings)
     }
@@ -76,10 +76,11 @@ fn list<'a, T>(
     entries: &'a [T],
     describe: impl Fn(&'a T) -> (&'a str, String),
 ) -> fmt::Result {
-    let shown: Vec<_> = entries.iter().take(SHOWN).map(describe).collect();
+    let shown = entries.iter().take(SHOWN).map(describe);
+    let shown: Vec<_> = shown.map(|(name, description)| (visible(name), description)).collect();
     let width = shown.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0).min(40);
     for (name, description) in shown {
-        writeln!(f, "    {:width$}  {description}", if name.is_empty() { "-" } else { name })?;
+        writeln!(f, "    {:width$}  {}", if name.is_empty() { "-" } else { &name }, visible(&description))?;
     }
     more(f, entries.len() as u64)
 }

@@ -49,14 +49,26 @@ pub struct EnvironmentSample {
 
 /// A map that cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the environment map should have {width} x {height} pixels (at least one), but has {pixels}")]
-pub struct EnvironmentError {
-    /// Pixels across, as stated.
-    pub width: u32,
-    /// Pixels down, as stated.
-    pub height: u32,
-    /// Pixels that there are.
-    pub pixels: usize,
+#[non_exhaustive]
+pub enum EnvironmentError {
+    /// The size is not that of the pixels.
+    #[error("the environment map should have {width} x {height} pixels (at least one), but has {pixels}")]
+    Size {
+        /// Pixels across, as stated.
+        width: u32,
+        /// Pixels down, as stated.
+        height: u32,
+        /// Pixels that there are.
+        pixels: usize,
+    },
+    /// A pixel is not light.
+    #[error("pixel ({x}, {y}) of the environment map: radiance is negative or not finite")]
+    Radiance {
+        /// Its column, from the left.
+        x: usize,
+        /// Its row, from the top.
+        y: usize,
+    },
 }
 
 impl Environment {
@@ -67,10 +79,10 @@ impl Environment {
     }
 
     /// A map by longitude and latitude, linear radiance, turned counter-clockwise seen from +Y by `rotation` radians
-    /// and multiplied by `scale`. NaN and negative pixels count as black.
+    /// and multiplied by `scale`.
     ///
     /// # Errors
-    /// When `pixels` is empty or not `width` x `height` pixels.
+    /// When `pixels` is empty or not `width` x `height` pixels, or one of them is negative or not finite.
     pub fn latlong(
         width: u32,
         height: u32,
@@ -79,7 +91,11 @@ impl Environment {
         scale: Vec3,
     ) -> Result<Self, EnvironmentError> {
         if pixels.is_empty() || u64::from(width) * u64::from(height) != pixels.len() as u64 {
-            return Err(EnvironmentError { width, height, pixels: pixels.len() });
+            return Err(EnvironmentError::Size { width, height, pixels: pixels.len() });
+        }
+        if let Some(bad) = pixels.iter().position(|p| !p.iter().all(|c| c.is_finite() && *c >= 0.0)) {
+            let width = width as usize;
+            return Err(EnvironmentError::Radiance { x: bad % width, y: bad / width });
         }
         let map = Map::new(width as usize, height as usize, pixels);
         Ok(Self { source: Source::Map(Arc::new(map)), turn: turn(rotation), scale })
@@ -192,7 +208,7 @@ struct Map {
 
 impl Map {
     fn new(width: usize, height: usize, pixels: Arc<[[f32; 3]]>) -> Self {
-        let pixels = sanitised(pixels);
+        let pixels = summable(pixels);
         let mut map = Self { width, height, pixels, distribution: None, mean: Vec3::ZERO };
         let mut weights = Vec::with_capacity(width * height);
         let mut sum = glam::DVec3::ZERO;
@@ -269,15 +285,13 @@ impl Map {
     }
 }
 
-/// Radiance that can be summed: NaN and negative become 0, and nothing is brighter than the sun seen from Earth,
-/// about 1e9 in relative units.
-fn sanitised(pixels: Arc<[[f32; 3]]>) -> Arc<[[f32; 3]]> {
+/// Radiance that can be summed: nothing is brighter than the sun seen from Earth, about 1e9 in relative units.
+fn summable(pixels: Arc<[[f32; 3]]>) -> Arc<[[f32; 3]]> {
     const BRIGHTEST: f32 = 1e10;
-    let fine = |x: &f32| (0.0..=BRIGHTEST).contains(x);
-    if pixels.iter().flatten().all(fine) {
+    if pixels.iter().flatten().all(|x| *x <= BRIGHTEST) {
         return pixels;
     }
-    pixels.iter().map(|p| p.map(|x| if x > 0.0 { x.min(BRIGHTEST) } else { 0.0 })).collect()
+    pixels.iter().map(|p| p.map(|x| x.min(BRIGHTEST))).collect()
 }
 
 #[cfg(test)]
@@ -467,13 +481,23 @@ mod tests {
     }
 
     #[test]
-    fn black_has_no_samples_and_broken_pixels_are_black() {
+    fn black_has_no_samples() {
         assert_eq!(Environment::constant(Vec3::ZERO).sample([0.5, 0.5]), None);
-        let bad: Arc<[[f32; 3]]> = Arc::new([[f32::NAN, -1.0, f32::NEG_INFINITY]; 8]);
-        let e = Environment::latlong(4, 2, bad, f32::NAN, Vec3::ONE).unwrap();
+        let e = Environment::latlong(4, 2, Arc::new([[0.0; 3]; 8]), f32::NAN, Vec3::ONE).unwrap();
         assert!(e.is_black());
         assert_eq!(e.sample([0.5, 0.5]), None);
         assert_eq!((e.radiance(Vec3::X), e.pdf(Vec3::X)), (Vec3::ZERO, 0.0));
+    }
+
+    #[test]
+    fn what_is_no_map_of_light_is_an_error() {
+        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0] {
+            let mut pixels = [[1.0; 3]; 8];
+            pixels[6][1] = bad;
+            let error = Environment::latlong(4, 2, Arc::new(pixels), 0.0, Vec3::ONE).unwrap_err();
+            assert_eq!(error, EnvironmentError::Radiance { x: 2, y: 1 }, "{bad}");
+        }
+        assert!(Environment::latlong(4, 2, Arc::new([[f32::MAX; 3]; 8]), 0.0, Vec3::ONE).is_ok());
         assert!(Environment::latlong(4, 2, Arc::new([[1.0; 3]; 7]), 0.0, Vec3::ONE).is_err());
         assert!(Environment::latlong(0, 0, Arc::new([]), 0.0, Vec3::ONE).is_err());
     }

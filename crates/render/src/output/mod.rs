@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 pub use png::write_png;
 
-use crate::{Film, View};
+use crate::{Aov, Film, View};
 
 /// A file format for pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -94,14 +94,9 @@ pub enum OutputError {
 /// When the extension is unknown, there are no pixels, or the file cannot be written. Then nothing is left behind.
 pub fn write_film(path: &Path, film: &Film, options: &WriteOptions) -> Result<Vec<PathBuf>, OutputError> {
     let format = Format::from_path(path)?;
-    let failed = |path: &Path| {
-        let path = path.to_owned();
-        move |source| OutputError::Io { path, source }
-    };
     if film.window().width == 0 || film.window().height == 0 {
         return Err(OutputError::Empty);
     }
-    let mut written = vec![path.to_owned()];
     match format {
         Format::Png => atomically(path, |out| write_png(out, &film.color(), &options.view, options.bit_depth)),
         Format::Hdr => atomically(path, |out| hdr::write(out, &film.color())),
@@ -110,24 +105,44 @@ pub fn write_film(path: &Path, film: &Film, options: &WriteOptions) -> Result<Ve
     .map_err(failed(path))?;
     if format != Format::Exr {
         for aov in film.aovs() {
-            let beside = path.with_extension(format!("{}.exr", aov.name()));
+            let beside = beside(path, *aov);
             atomically(&beside, |out| exr::write(out, film, exr::Layers::Only(*aov))).map_err(failed(&beside))?;
-            written.push(beside);
         }
     }
-    Ok(written)
+    files(path, film.aovs())
+}
+
+/// The files that [`write_film`] writes for a film with these AOVs, the picture first.
+///
+/// # Errors
+/// When the extension is unknown.
+pub fn files(path: &Path, aovs: &[Aov]) -> Result<Vec<PathBuf>, OutputError> {
+    let aovs = if Format::from_path(path)? == Format::Exr { &[] } else { aovs };
+    Ok(std::iter::once(path.to_owned()).chain(aovs.iter().map(|aov| beside(path, *aov))).collect())
+}
+
+/// Whether a file can be written there, by creating and removing what [`write_film`] would rename at the end. A file
+/// of that name stays as it is.
+///
+/// # Errors
+/// [`OutputError::Io`] when it cannot.
+pub fn try_path(path: &Path) -> Result<(), OutputError> {
+    let temporary = temporary(path).map_err(failed(path))?;
+    fs::File::create(&temporary).and_then(|_| fs::remove_file(&temporary)).map_err(failed(path))
+}
+
+fn beside(path: &Path, aov: Aov) -> PathBuf {
+    path.with_extension(format!("{}.exr", aov.name()))
+}
+
+fn failed(path: &Path) -> impl FnOnce(io::Error) -> OutputError {
+    let path = path.to_owned();
+    move |source| OutputError::Io { path, source }
 }
 
 /// Writes a file so that it appears whole or not at all.
 fn atomically(path: &Path, write: impl FnOnce(&mut BufWriter<fs::File>) -> io::Result<()>) -> io::Result<()> {
-    let name = path.file_name().ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "not a file name"))?;
-    if path.is_dir() {
-        return Err(io::Error::new(io::ErrorKind::IsADirectory, "is a folder"));
-    }
-    let mut temporary = std::ffi::OsString::from(".");
-    temporary.push(name);
-    temporary.push(format!(".{}.tmp", std::process::id()));
-    let temporary = path.with_file_name(temporary);
+    let temporary = temporary(path)?;
     let result = (|| {
         let mut out = BufWriter::new(fs::File::create(&temporary)?);
         write(&mut out)?;
@@ -139,6 +154,18 @@ fn atomically(path: &Path, write: impl FnOnce(&mut BufWriter<fs::File>) -> io::R
         let _ = fs::remove_file(&temporary);
     }
     result
+}
+
+/// Where a file is written before it is renamed to `path`: in the same folder.
+fn temporary(path: &Path) -> io::Result<PathBuf> {
+    let name = path.file_name().ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "not a file name"))?;
+    if path.is_dir() {
+        return Err(io::Error::new(io::ErrorKind::IsADirectory, "is a folder"));
+    }
+    let mut temporary = std::ffi::OsString::from(".");
+    temporary.push(name);
+    temporary.push(format!(".{}.tmp", std::process::id()));
+    Ok(path.with_file_name(temporary))
 }
 
 /// Errors of the codecs as those of the system.

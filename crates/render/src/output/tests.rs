@@ -5,7 +5,7 @@ use crate::{Aov, Crop, ViewTransform};
 
 /// A film of 5 x 3 pixels with opaque, partly covered and empty ones, bright and dark, and two AOVs.
 fn film(crop: Option<Crop>, alpha: bool) -> Film {
-    let mut film = Film::new(5, 3, crop, &[Aov::Depth, Aov::Normal]);
+    let mut film = Film::new(5, 3, crop, &[Aov::Depth, Aov::Normal]).unwrap();
     for mut band in film.bands_mut(2) {
         for y in band.rows() {
             for x in band.columns() {
@@ -149,9 +149,22 @@ fn what_cannot_be_written_is_an_error_that_names_the_file() {
     let taken = folder.path().join("b.png");
     fs::create_dir(&taken).unwrap();
     assert!(matches!(write_film(&taken, &film, &WriteOptions::default()), Err(OutputError::Io { .. })));
-    let empty = Film::new(4, 4, Some(Crop { x: 4, y: 0, width: 1, height: 1 }), &[]);
+    let empty = Film::new(4, 4, Some(Crop { x: 4, y: 0, width: 1, height: 1 }), &[]).unwrap();
     let target = folder.path().join("c.png");
     assert!(matches!(write_film(&target, &empty, &WriteOptions::default()), Err(OutputError::Empty)));
     assert!(write_png(&mut Cursor::new(Vec::new()), &empty.color(), &View::default(), BitDepth::Eight).is_err());
     assert_eq!(fs::read_dir(&folder).unwrap().count(), 1);
+}
+
+#[test]
+fn a_place_is_tried_without_a_trace() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.png");
+    fs::write(&path, "old").unwrap();
+    try_path(&path).unwrap();
+    assert_eq!(fs::read(&path).unwrap(), b"old");
+    try_path(&folder.path().join("b.png")).unwrap();
+    assert_eq!(fs::read_dir(&folder).unwrap().count(), 1);
+    assert!(try_path(&folder.path().join("no/such/folder/a.png")).is_err());
+    assert!(try_path(folder.path()).is_err());
 }
