@@ -201,7 +201,7 @@ pub(crate) struct CameraArgs {
 #[command(next_help_heading = "Scene")]
 pub(crate) struct SceneArgs {
     /// The file's upward axis: +X, -X, +Y, -Y, +Z or -Z [default: what the format says, else +Y]
-    #[arg(long, value_name = "AXIS", value_parser = values::up_axis, allow_hyphen_values = true)]
+    #[arg(long, value_name = "AXIS", allow_hyphen_values = true)]
     pub(crate) up: Option<UpAxis>,
 
     /// Light from around: an image by longitude and latitude (.hdr, .exr), or studio, white, black
@@ -286,7 +286,7 @@ pub(crate) struct InspectArgs {
     pub(crate) json: bool,
 
     /// The file's upward axis: +X, -X, +Y, -Y, +Z or -Z [default: what the format says, else +Y]
-    #[arg(long, value_name = "AXIS", value_parser = values::up_axis, allow_hyphen_values = true)]
+    #[arg(long, value_name = "AXIS", allow_hyphen_values = true)]
     pub(crate) up: Option<UpAxis>,
 
     /// The tier of precision that the trees are built for: fast, robust or double

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use firsthit_import::UpAxis;
+use firsthit_import::srgb;
 use firsthit_render::{Aov, CameraChoice, Crop, EffectOverrides, EffectSet, IntegratorChoice, ViewTransform};
 use glam::{DVec3, Vec3};
 
@@ -36,7 +36,7 @@ pub(crate) struct Color(pub(crate) Vec3);
 
 impl Color {
     pub(crate) fn linear(self) -> Vec3 {
-        self.0.map(|c| srgb_to_linear(c.into()) as f32)
+        self.0.map(|c| srgb::to_linear(c.into()) as f32)
     }
 }
 
@@ -107,13 +107,7 @@ pub(crate) fn plane(s: &str) -> Result<Plane, String> {
 }
 
 pub(crate) fn color(s: &str) -> Result<Color, String> {
-    let rgb = match s.strip_prefix('#') {
-        Some(hex) if hex.len() == 6 && hex.bytes().all(|b| b.is_ascii_hexdigit()) => {
-            u32::from_str_radix(hex, 16).ok().map(|v| [v >> 16, v >> 8, v].map(|c| f64::from(c & 0xff) / 255.0))
-        }
-        Some(_) => None,
-        None => numbers(s),
-    };
+    let rgb = srgb::from_hex(s).or_else(|| numbers(s));
     rgb.filter(|rgb| rgb.iter().all(|c| (0.0..=1.0).contains(c)))
         .map(|rgb| Color(Vec3::from_array(rgb.map(|c| c as f32))))
         .ok_or_else(|| "expected three numbers from 0 to 1, or #rrggbb".into())
@@ -126,18 +120,6 @@ pub(crate) fn tone_mapping(s: &str) -> Result<ViewTransform, String> {
 
 pub(crate) fn camera(s: &str) -> Result<CameraChoice, String> {
     Ok(if s == "auto" { CameraChoice::Auto } else { CameraChoice::Named(s.to_owned()) })
-}
-
-pub(crate) fn up_axis(s: &str) -> Result<UpAxis, String> {
-    Ok(match s.to_ascii_uppercase().as_str() {
-        "+X" | "X" => UpAxis::PosX,
-        "-X" => UpAxis::NegX,
-        "+Y" | "Y" => UpAxis::PosY,
-        "-Y" => UpAxis::NegY,
-        "+Z" | "Z" => UpAxis::PosZ,
-        "-Z" => UpAxis::NegZ,
-        _ => return Err("expected +X, -X, +Y, -Y, +Z or -Z".into()),
-    })
 }
 
 pub(crate) fn hdri(s: &str) -> Result<Hdri, String> {
@@ -221,11 +203,6 @@ fn numbers<const N: usize>(s: &str) -> Option<[f64; N]> {
     list?.try_into().ok()
 }
 
-/// IEC 61966-2-1.
-pub(crate) fn srgb_to_linear(c: f64) -> f64 {
-    if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -299,12 +276,5 @@ mod tests {
         assert!(integrator("path-of-least-resistance").is_err());
         assert_eq!(aovs("depth,normal,depth"), Ok(AovList(vec![Aov::Depth, Aov::Normal])));
         assert!(aovs("depth,,normal").is_err());
-    }
-
-    #[test]
-    fn axes_are_read_in_either_case() {
-        assert_eq!(up_axis("z"), Ok(UpAxis::PosZ));
-        assert_eq!(up_axis("-Y"), Ok(UpAxis::NegY));
-        assert!(up_axis("W").is_err());
     }
 }

@@ -5,6 +5,7 @@ use firsthit_import::scene::{EnvironmentDesc, ImageDesc, MaterialModel, Pixels};
 use glam::Vec3;
 
 use crate::stage::{Backdrop, StageError};
+use crate::view::srgb_to_linear;
 use crate::{Environment, EnvironmentChoice, StageOptions};
 
 /// How bright the studio is where the file brings lights of its own: their shadows are not black then.
@@ -94,11 +95,14 @@ fn map(image: &ImageDesc, rotation: f32, scale: Vec3) -> Result<Environment, Sta
 
 /// Linear RGB; 8- and 16-bit images are taken as sRGB.
 fn linear_pixels(pixels: &Pixels) -> std::sync::Arc<[[f32; 3]]> {
-    let decode = |x: f32| if x <= 0.040_45 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) };
     match pixels {
         Pixels::Rgb32F(p) => p.clone(),
-        Pixels::Rgba8(p) => p.iter().map(|p| [p[0], p[1], p[2]].map(|x| decode(f32::from(x) / 255.0))).collect(),
-        Pixels::Rgba16(p) => p.iter().map(|p| [p[0], p[1], p[2]].map(|x| decode(f32::from(x) / 65535.0))).collect(),
+        Pixels::Rgba8(p) => {
+            p.iter().map(|p| [p[0], p[1], p[2]].map(|x| srgb_to_linear(f32::from(x) / 255.0))).collect()
+        }
+        Pixels::Rgba16(p) => {
+            p.iter().map(|p| [p[0], p[1], p[2]].map(|x| srgb_to_linear(f32::from(x) / 65535.0))).collect()
+        }
     }
 }
 

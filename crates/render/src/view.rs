@@ -1,5 +1,6 @@
 //! From linear radiance to what a display shows.
 
+use firsthit_import::srgb;
 use glam::{Mat3, Vec3};
 
 /// How linear colours are brought into the range of a display.
@@ -103,9 +104,7 @@ pub fn linear_to_srgb(x: f32) -> f32 {
 /// The inverse of [`linear_to_srgb`].
 #[must_use]
 pub fn srgb_to_linear(x: f32) -> f32 {
-    let x = f64::from(x.clamp(0.0, 1.0));
-    let linear = if x <= 0.040_45 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) };
-    linear as f32
+    srgb::to_linear(x.clamp(0.0, 1.0).into()) as f32
 }
 
 /// Khronos PBR Neutral Tone Mapper, specification of 2024, with its constants: linear to linear.

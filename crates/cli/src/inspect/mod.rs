@@ -276,22 +276,8 @@ fn material<'a>(name: &'a str, model: &MaterialModel) -> Material<'a> {
 }
 
 fn texture_count(pbr: &PbrMaterial) -> usize {
-    let all = [
-        &pbr.base_color_texture,
-        &pbr.opacity_texture,
-        &pbr.metallic_texture,
-        &pbr.roughness_texture,
-        &pbr.normal_texture,
-        &pbr.bump_texture,
-        &pbr.occlusion_texture,
-        &pbr.emissive_texture,
-        &pbr.transmission_texture,
-        &pbr.thickness_texture,
-        &pbr.specular_texture,
-        &pbr.specular_color_texture,
-    ];
     // Metalness and roughness mostly share an image.
-    let mut images: Vec<usize> = all.into_iter().flatten().map(|t| t.image).collect();
+    let mut images: Vec<usize> = pbr.textures().map(|t| t.image).collect();
     images.sort_unstable();
     images.dedup();
     images.len()
