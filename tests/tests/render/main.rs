@@ -312,7 +312,7 @@ fn solids_absorb_by_beers_law() {
 }
 
 #[test]
-fn back_faces_of_single_sided_materials_are_not_seen_but_cast_shadows() {
+fn back_faces_of_single_sided_materials_are_not_there_for_sight_and_light() {
     let sided = |double_sided| {
         pbr(|m| {
             m.base_color = Vec4::new(0.0, 0.0, 0.0, 1.0);
@@ -337,17 +337,20 @@ fn back_faces_of_single_sided_materials_are_not_seen_but_cast_shadows() {
         let above = Probe::new(&mirrored).from(DVec3::new(0.1, 3.0, 0.0)).look(DVec3::ZERO).x;
         assert_near(above, 1.0, 1e-5);
     }
-    let mut scene = scene_of(&[diffuse(0.5), sided(false)]);
-    quad(&mut scene, DVec3::new(-9.0, 0.0, 9.0), DVec3::X * 18.0, DVec3::Z * -18.0, 0);
-    // Its back is towards the light.
-    quad(&mut scene, DVec3::new(-1.0, 1.0, 1.0), DVec3::Z * -2.0, DVec3::X * 2.0, 1);
-    let irradiance = Vec3::splat(1.0);
-    scene.lights = vec![light(LightKind::Directional { direction: DVec3::NEG_Y, irradiance, angle: 0.0 })];
-    let options = StageOptions {
-        effects: EffectOverrides { remove: EffectSet::AREA_LIGHTS, ..EffectOverrides::default() },
-        ..StageOptions::default()
-    };
-    assert_eq!(Probe::new(&scene).stage(options).from(DVec3::new(-3.0, 0.5, 0.0)).look(DVec3::ZERO).x, 0.0);
+    // Light that meets the back goes on; light that meets the front casts a shadow.
+    for (edge_u, edge_v, arriving) in [(DVec3::Z * -2.0, DVec3::X * 2.0, 1.0), (DVec3::X * 2.0, DVec3::Z * -2.0, 0.0)] {
+        let mut scene = scene_of(&[diffuse(0.5), sided(false)]);
+        quad(&mut scene, DVec3::new(-9.0, 0.0, 9.0), DVec3::X * 18.0, DVec3::Z * -18.0, 0);
+        quad(&mut scene, DVec3::new(-1.0, 1.0, 1.0), edge_u, edge_v, 1);
+        let irradiance = Vec3::splat(1.0);
+        scene.lights = vec![light(LightKind::Directional { direction: DVec3::NEG_Y, irradiance, angle: 0.0 })];
+        let options = StageOptions {
+            effects: EffectOverrides { remove: EffectSet::AREA_LIGHTS, ..EffectOverrides::default() },
+            ..StageOptions::default()
+        };
+        let seen = Probe::new(&scene).stage(options).from(DVec3::new(-3.0, 0.5, 0.0)).look(DVec3::ZERO).x;
+        assert_near(seen, arriving * 0.5 / std::f64::consts::PI, 1e-5);
+    }
 }
 
 #[test]

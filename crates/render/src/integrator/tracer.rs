@@ -104,16 +104,17 @@ impl<'a, const TEXTURES: bool, const FILTERED: bool> Tracer<'a, TEXTURES, FILTER
     fn is_seen(&self, ray: &Ray<f64>, hit: &Hit) -> bool {
         let world = &self.stage.world;
         let material = world.material(hit.id);
-        if self.is_culled(ray, hit, material) {
+        if self.is_culled(hit, material, ray.direction) {
             return false;
         }
         !self.stage.flags[material].alpha
             || self.stage.materials[material].coverage::<TEXTURES>(&world.attributes(hit, true)) > 0.0
     }
 
-    /// Whether a surface is not there for a ray that meets its back.
-    fn is_culled(&self, ray: &Ray<f64>, hit: &Hit, material: usize) -> bool {
-        self.stage.flags[material].culls && !self.stage.world.faces(hit.id, ray.direction)
+    /// Whether a surface is not there for what meets its back: sight, or the light on its way. A shadow ray runs
+    /// against the light.
+    fn is_culled(&self, hit: &Hit, material: usize, towards: DVec3) -> bool {
+        self.stage.flags[material].culls && !self.stage.world.faces(hit.id, towards)
     }
 
     /// Whether anything lies between a point and infinity or `distance`, alpha included (clear surfaces count as
@@ -126,7 +127,7 @@ impl<'a, const TEXTURES: bool, const FILTERED: bool> Tracer<'a, TEXTURES, FILTER
                     return true;
                 }
                 let material = this.stage.world.material(hit.id);
-                !this.is_culled(&ray, hit, material)
+                !this.is_culled(hit, material, -ray.direction)
                     && (!this.stage.flags[material].alpha
                         || this.stage.materials[material].coverage::<TEXTURES>(&this.stage.world.attributes(hit, true))
                             > covers)
@@ -170,7 +171,7 @@ impl<'a, const TEXTURES: bool, const FILTERED: bool> Tracer<'a, TEXTURES, FILTER
                 return false;
             }
             let index = world.material(hit.id);
-            if self.is_culled(ray, hit, index) {
+            if self.is_culled(hit, index, -ray.direction) {
                 return false;
             }
             if !stage.flags[index].lets_through {
