@@ -209,24 +209,23 @@ fn without_dots(path: &Path) -> PathBuf {
     out
 }
 
-/// RFC 3986 section 2.1; what is no escape, or gives no UTF-8, stays as it is.
+/// What is no escape, or gives no UTF-8, stays as it is.
 fn percent_decoded(uri: &str) -> String {
     let mut rest = uri.as_bytes();
     let mut out = Vec::with_capacity(rest.len());
     while let [first, tail @ ..] = rest {
-        let hex = |b: &u8| (*b as char).to_digit(16);
-        match (first, tail) {
-            (b'%', [h, l, tail @ ..]) if hex(h).is_some() && hex(l).is_some() => {
-                out.push((hex(h).unwrap_or(0) * 16 + hex(l).unwrap_or(0)) as u8);
-                rest = tail;
-            }
-            _ => {
-                out.push(*first);
-                rest = tail;
-            }
-        }
+        let (byte, after) = percent_escape(rest).unwrap_or((*first, tail));
+        out.push(byte);
+        rest = after;
     }
     String::from_utf8(out).unwrap_or_else(|_| uri.to_owned())
+}
+
+/// The byte of the escape that a text begins with (RFC 3986, section 2.1), and what follows it.
+pub(crate) fn percent_escape(text: &[u8]) -> Option<(u8, &[u8])> {
+    let [b'%', high, low, rest @ ..] = text else { return None };
+    let digit = |b: u8| char::from(b).to_digit(16);
+    Some(((digit(*high)? << 4 | digit(*low)?) as u8, rest))
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@
 //! | firsthit scene files (`.toml`, `.json`) | [`toml`] |
 #![forbid(unsafe_code)]
 
+mod bake;
 mod error;
 mod files;
 pub mod gltf;

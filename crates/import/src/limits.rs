@@ -7,7 +7,7 @@ pub struct Limits {
     pub file_bytes: u64,
     /// Most vertices, and most triangles, in one scene before instancing.
     pub elements: u64,
-    /// Most instances in one scene.
+    /// Most instances, lights and cameras in one scene; one of a long name counts as several.
     pub instances: u64,
     /// Widest or highest image, in pixels.
     pub image_side: u32,
@@ -22,7 +22,7 @@ impl Default for Limits {
         Self {
             file_bytes: 4 << 30,
             elements: 1 << 30,
-            instances: 1 << 26,
+            instances: 1 << 22,
             image_side: 1 << 15,
             image_bytes: 8 << 30,
             depth: 4096,

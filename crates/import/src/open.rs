@@ -1,11 +1,14 @@
 //! One door for all formats.
 
-use std::fs;
+use std::fs::{self, File};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use glam::{DAffine3, DMat3, DVec3};
 
+use crate::scene::SurfaceDesc;
+use crate::toml::Inclusion;
 use crate::{ErrorKind, ImportError, Limits, Report, SceneDesc, files, gltf, obj, toml};
 
 /// Which axis of the file points up.
@@ -108,11 +111,26 @@ pub struct Imported {
 pub fn open(path: impl AsRef<Path>, options: &Options) -> Result<Imported, ImportError> {
     let path = path.as_ref();
     let file = if path.is_dir() { only_model(path)? } else { path.to_owned() };
-    let mut imported = read_as(Format::of(&file, &options.limits)?, &file, options, &[])?;
+    let mut imported = read_as(Format::of(&file)?, &file, options, &Inclusion::default())?;
     if let Some(up) = options.up {
         imported.scene.transform(up.to_y());
     }
-    Ok(imported)
+    imported.finished(&file, options)
+}
+
+impl Imported {
+    /// The last checks of a whole scene: for transforms, which may have been sound until they were multiplied, and for
+    /// something to see.
+    pub(crate) fn finished(mut self, file: &Path, options: &Options) -> Result<Self, ImportError> {
+        let Self { scene, report } = &mut self;
+        let warn = |_, name: &str, message| report.warn(file, format!("instance '{name}'"), message);
+        scene.bake(&options.limits, warn).map_err(|kind| ImportError::new(file, "", kind))?;
+        let mut surfaces = scene.instances.iter().flat_map(|i| &scene.meshes[i.mesh].geometries).map(|g| &g.surface);
+        if !surfaces.any(|s| !matches!(s, SurfaceDesc::Triangles(mesh) if mesh.triangles.is_empty())) {
+            report.warn(file, "", "has no surface: there is nothing to see");
+        }
+        Ok(self)
+    }
 }
 
 /// The formats that are read.
@@ -120,39 +138,52 @@ pub fn open(path: impl AsRef<Path>, options: &Options) -> Result<Imported, Impor
 pub(crate) enum Format {
     Obj,
     Gltf,
-    Scene,
+    Toml,
+    /// glTF or a scene file.
+    Json,
 }
 
 const FORMATS: &str = "firsthit reads .obj (also .obj.zst and .obj.gz), .gltf, .glb, and scene files (.toml, .json)";
 
 impl Format {
     /// Tells a file's format by its extension, where that is not enough by its first bytes.
-    pub(crate) fn of(file: &Path, limits: &Limits) -> Result<Self, ImportError> {
+    pub(crate) fn of(file: &Path) -> Result<Self, ImportError> {
+        let io = |e| ImportError::io(file, e);
         // A file that is not there is reported as that, whatever it is called.
-        fs::metadata(file).map_err(|e| ImportError::io(file, e))?;
+        let meta = fs::metadata(file).map_err(io)?;
         match files::format_extension(file).as_str() {
             "obj" => Ok(Self::Obj),
             "gltf" | "glb" => Ok(Self::Gltf),
-            "toml" => Ok(Self::Scene),
-            "json" => Ok(if is_gltf_json(&files::read(file, limits)?) { Self::Gltf } else { Self::Scene }),
-            _ if files::read(file, limits)?.starts_with(b"glTF") => Ok(Self::Gltf),
-            "" => Err(ImportError::unsupported(file, "", format!("the file name has no extension; {FORMATS}"))),
-            other => Err(ImportError::unsupported(file, "", format!("'.{other}' files are not read; {FORMATS}"))),
+            "toml" => Ok(Self::Toml),
+            "json" => Ok(Self::Json),
+            other => {
+                let mut start = Vec::new();
+                if meta.is_file() {
+                    File::open(file).and_then(|f| f.take(4).read_to_end(&mut start)).map_err(io)?;
+                }
+                match other {
+                    _ if start == b"glTF" => Ok(Self::Gltf),
+                    "" => Err(ImportError::unsupported(file, "", format!("the file name has no extension; {FORMATS}"))),
+                    _ => Err(ImportError::unsupported(file, "", format!("'.{other}' files are not read; {FORMATS}"))),
+                }
+            }
         }
     }
 }
 
-/// Reads a file of a known format. `including` are the scene files that led here, outermost first.
+/// Reads a file of a known format, which the scene files of `including` led to.
 pub(crate) fn read_as(
     format: Format,
     file: &Path,
     options: &Options,
-    including: &[PathBuf],
+    including: &Inclusion,
 ) -> Result<Imported, ImportError> {
+    let bytes = files::read(file, &options.limits)?;
     match format {
-        Format::Obj => obj::read(file, options),
-        Format::Gltf => gltf::read(file, options),
-        Format::Scene => toml::read_included(file, options, including),
+        Format::Obj => obj::read_bytes(bytes, file, options),
+        Format::Gltf => gltf::read_bytes(&bytes, file, options),
+        Format::Json if is_gltf_json(&bytes) => gltf::read_bytes(&bytes, file, options),
+        Format::Toml | Format::Json => toml::read_bytes(&bytes, file, options, including),
     }
 }
 
@@ -166,15 +197,17 @@ fn is_gltf_json(bytes: &[u8]) -> bool {
 
 /// The file that a folder stands for.
 fn only_model(folder: &Path) -> Result<PathBuf, ImportError> {
+    for scene in ["scene.toml", "scene.json"].map(|name| folder.join(name)) {
+        if scene.is_file() {
+            return Ok(scene);
+        }
+    }
     let io = |e| ImportError::io(folder, e);
     let mut models = Vec::new();
     for entry in fs::read_dir(folder).map_err(io)? {
         let path = entry.map_err(io)?.path();
-        let is_scene = path.file_name().is_some_and(|n| n == "scene.toml" || n == "scene.json");
-        if is_scene && path.is_file() {
-            return Ok(path);
-        }
-        if matches!(files::format_extension(&path).as_str(), "obj" | "gltf" | "glb" | "toml") && path.is_file() {
+        // Not .toml: other programs have files of that name beside their models.
+        if matches!(files::format_extension(&path).as_str(), "obj" | "gltf" | "glb") && path.is_file() {
             models.push(path);
         }
     }

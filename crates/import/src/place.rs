@@ -71,6 +71,40 @@ impl SceneDesc {
         self.cameras.extend(parts.cameras.into_iter().map(|c| c.moved(transform)));
     }
 
+    /// Leaves out the meshes that no instance places.
+    pub(crate) fn drop_unused_meshes(&mut self) {
+        let mut used = vec![false; self.meshes.len()];
+        self.instances.iter().for_each(|i| used[i.mesh] = true);
+        let new_index = keep(&mut self.meshes, &used);
+        self.instances.iter_mut().for_each(|i| i.mesh = new_index[i.mesh]);
+    }
+
+    /// Leaves out the materials that no geometry has: those that were replaced, or that a file only lists.
+    pub(crate) fn drop_unused_materials(&mut self) {
+        let mut slots: Vec<&mut usize> =
+            self.meshes.iter_mut().flat_map(|m| &mut m.geometries).filter_map(|g| g.material.as_mut()).collect();
+        let mut used = vec![false; self.materials.len()];
+        slots.iter().for_each(|m| used[**m] = true);
+        let new_index = keep(&mut self.materials, &used);
+        slots.iter_mut().for_each(|m| **m = new_index[**m]);
+    }
+
+    /// Leaves out the images that neither a material nor the environment shows.
+    pub(crate) fn drop_unused_images(&mut self) {
+        let textures = self.materials.iter_mut().filter_map(|m| match &mut m.model {
+            MaterialModel::Pbr(pbr) => Some(pbr),
+            _ => None,
+        });
+        let mut slots: Vec<&mut usize> = textures.flat_map(|pbr| pbr.textures_mut()).map(|t| &mut t.image).collect();
+        if let Some(EnvironmentDesc::LatLong { image, .. }) = &mut self.environment {
+            slots.push(image);
+        }
+        let mut used = vec![false; self.images.len()];
+        slots.iter().for_each(|i| used[**i] = true);
+        let new_index = keep(&mut self.images, &used);
+        slots.iter_mut().for_each(|i| **i = new_index[**i]);
+    }
+
     /// Moves everything that has a place: instances, lights, cameras. The environment stays.
     pub fn transform(&mut self, by: DAffine3) {
         let parts = Placeable {
@@ -79,6 +113,24 @@ impl SceneDesc {
             cameras: std::mem::take(&mut self.cameras),
         };
         self.place(parts, by);
+    }
+}
+
+/// Leaves out the items that are not used; gives the new index of each that is.
+fn keep<T>(items: &mut Vec<T>, used: &[bool]) -> Vec<usize> {
+    let mut kept = 0;
+    let new_index = used.iter().map(|&u| (kept, kept += usize::from(u)).0).collect();
+    let mut used = used.iter();
+    items.retain(|_| used.next() == Some(&true));
+    new_index
+}
+
+impl Placeable {
+    /// What it counts against [`Limits::instances`](crate::Limits::instances). Names are copied with what they name,
+    /// so that a long one counts as several.
+    pub(crate) fn count(&self) -> u64 {
+        let names = self.instances.iter().map(|i| &i.name).chain(self.lights.iter().map(|l| &l.name));
+        names.chain(self.cameras.iter().map(|c| &c.name)).map(|name| 1 + name.len() as u64 / 256).sum()
     }
 }
 

@@ -99,7 +99,8 @@ impl Report {
         self.files.extend(file.canonicalize());
     }
 
-    /// Takes over what another file's reading brought up.
+    /// Takes over what another file's reading brought up, but for the triangles: how many there are depends on how often
+    /// its content is placed.
     pub fn absorb(&mut self, other: Self) {
         for w in other.warnings {
             self.warn(w.file, w.place, w.message);
@@ -112,6 +113,5 @@ impl Report {
             }
         }
         self.animations += other.animations;
-        self.triangles_all_scenes += other.triangles_all_scenes;
     }
 }

@@ -404,6 +404,19 @@ pub enum Pixels {
     Rgb32F(Arc<[[f32; 3]]>),
 }
 
+impl Pixels {
+    /// Their size in memory.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        let bytes = match self {
+            Self::Rgba8(p) => size_of_val(&**p),
+            Self::Rgba16(p) => size_of_val(&**p),
+            Self::Rgb32F(p) => size_of_val(&**p),
+        };
+        bytes as u64
+    }
+}
+
 /// A light that is not a surface of a mesh.
 #[derive(Clone, Debug)]
 pub struct LightDesc {

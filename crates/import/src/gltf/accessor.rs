@@ -1,12 +1,14 @@
 //! Accessors: typed arrays in buffers, of any component type, normalised, strided, sparse
 //! (glTF 2.0 specification, sections 3.6.2 and 3.11).
 
+use std::cell::Cell;
+
 use gltf::json::accessor::{ComponentType, Type};
 use gltf::json::validation::Checked;
 use gltf::json::{self, Index};
 
 use super::source::Source;
-use crate::{ErrorKind, ImportError};
+use crate::{ErrorKind, ImportError, Limits};
 
 /// How components are stored: the type, and whether integers stand for fractions.
 pub(super) type Format = (ComponentType, bool);
@@ -60,8 +62,20 @@ struct Sparse<'a> {
     values: Strided<'a>,
 }
 
-/// More zeros than any file has a use for: they cost the file nothing, but the reader memory.
+/// More zeros than any accessor has a use for: they cost the file nothing, but the reader memory.
 const MOST_ZEROS: u64 = 1 << 24;
+
+/// Most bytes of zeros that all accessors together may be read as.
+const MOST_ZERO_BYTES: u64 = 1 << 30;
+
+/// What may still be read of accessors that have no data.
+pub(super) struct ZeroBudget(Cell<u64>);
+
+impl ZeroBudget {
+    pub(super) fn new(limits: &Limits) -> Self {
+        Self(Cell::new(limits.file_bytes.min(MOST_ZERO_BYTES)))
+    }
+}
 
 impl Layout {
     /// Checks an accessor without looking at its data.
@@ -163,6 +177,14 @@ impl<'a> Accessor<'a> {
     /// As [`Layout::new`], and if its buffer has no data.
     pub(super) fn new(source: &'a Source<'_>, index: Index<json::Accessor>) -> Result<Self, ImportError> {
         let Layout { count, kind, format, data, sparse } = Layout::new(source, index)?;
+        if data.is_none() {
+            let bytes = count.saturating_mul(element_size(kind, ComponentType::F32).1);
+            let Some(left) = source.zeros.0.get().checked_sub(bytes) else {
+                let cause = "accessors without data are read so often that their zeros would take too much memory";
+                return Err(source.at(format!("/accessors/{}", index.value()), ErrorKind::Limit(cause.into())));
+            };
+            source.zeros.0.set(left);
+        }
         let data = data.map(|d| d.data(source)).transpose()?;
         let sparse = sparse.map(|s| Sparse::new(source, &s, count)).transpose()?;
         Ok(Self { count: count as usize, kind, format, data, sparse })
@@ -279,7 +301,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::{Limits, Report};
+    use crate::Report;
 
     /// Reads accessor 0 of a file whose only buffer is `bin`.
     fn with<T>(json: &str, bin: &[u8], f: impl FnOnce(Accessor<'_>) -> T) -> Result<T, String> {

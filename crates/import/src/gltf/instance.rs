@@ -11,6 +11,7 @@ use super::material;
 use super::mesh::{self, MeshReader, NormalMapping, Primitive};
 use super::node::Nodes;
 use super::source::Source;
+use crate::bake::deform;
 use crate::scene::{GeometryDesc, InstanceDesc, MeshDesc, SceneDesc, SurfaceDesc};
 use crate::{ImportError, Report};
 
@@ -23,8 +24,6 @@ enum Placement {
     Morphed,
     /// Moved by a skin; the node's own transform does not count.
     Skinned,
-    /// By a transform without an inverse.
-    Baked,
 }
 
 /// Reads all meshes and places those of the shown nodes. The scene has its materials by now.
@@ -40,7 +39,7 @@ pub(super) fn place(
     let mut shown_by: BTreeMap<usize, Vec<(usize, Placement)>> = BTreeMap::new();
     for &node in &nodes.shown {
         if let Some(mesh) = source.root.nodes[node].mesh {
-            shown_by.entry(mesh.value()).or_default().push((node, placement(source, nodes, node)));
+            shown_by.entry(mesh.value()).or_default().push((node, placement(source, node)));
         }
     }
     let mut reader = MeshReader::new(source);
@@ -66,28 +65,27 @@ pub(super) fn place(
             let transform = match how {
                 Placement::Shared | Placement::Morphed => nodes.world[node],
                 Placement::Skinned => skinned(source, nodes, node, &mut primitives, report)?,
-                Placement::Baked => baked(source, nodes, node, &mut primitives, report),
             };
             placed.extend(add_mesh(scene, &name, primitives).map(|mesh| (node, (mesh, transform))));
         }
     }
-    reader.finish(report);
-    for &node in &nodes.shown {
-        if let Some(&(mesh, transform)) = placed.get(&node) {
-            let name = source.root.nodes[node].name.clone().unwrap_or_else(|| format!("node {node}"));
-            scene.instances.push(InstanceDesc { name, mesh, transform });
-        }
-    }
+    mesh::warn_of_undrawn(source, report);
+    let drawn: Vec<usize> = nodes.shown.iter().copied().filter(|node| placed.contains_key(node)).collect();
+    scene.instances.extend(drawn.iter().map(|node| {
+        let name = source.root.nodes[*node].name.clone().unwrap_or_else(|| format!("node {node}"));
+        let (mesh, transform) = placed[node];
+        InstanceDesc { name, mesh, transform }
+    }));
+    let warn = |i: usize, _: &str, message| report.warn(source.file, format!("/nodes/{}", drawn[i]), message);
+    scene.bake(source.limits, warn).map_err(|kind| source.at("/nodes", kind))?;
     complete(scene);
     Ok(())
 }
 
-fn placement(source: &Source<'_>, nodes: &Nodes, node: usize) -> Placement {
+fn placement(source: &Source<'_>, node: usize) -> Placement {
     let json = &source.root.nodes[node];
     if json.skin.is_some() {
         Placement::Skinned
-    } else if bake::is_singular(&nodes.world[node]) {
-        Placement::Baked
     } else if json.weights.is_some() {
         Placement::Morphed
     } else {
@@ -123,32 +121,13 @@ fn skinned(
                 source.invalid(place, cause)
             })?);
         }
-        if !bake::deform(&mut p.mesh, |v| transforms[v], origin) {
+        if !deform(&mut p.mesh, |v| transforms[v], origin) {
             report.warn(source.file, format!("/nodes/{node}/skin"), "moves vertices out of all range: left out");
             p.mesh.triangles.clear();
         }
     }
     primitives.retain(|p| !p.mesh.triangles.is_empty());
     Ok(DAffine3::from_translation(origin))
-}
-
-/// Moves a mesh by its node's transform; drops it, with a warning, where no surface is left.
-fn baked(
-    source: &Source<'_>,
-    nodes: &Nodes,
-    node: usize,
-    primitives: &mut Vec<Primitive>,
-    report: &mut Report,
-) -> DAffine3 {
-    let world = nodes.world[node];
-    let origin = if world.translation.is_finite() { world.translation } else { DVec3::ZERO };
-    let before = primitives.len();
-    primitives.retain_mut(|p| bake::deform(&mut p.mesh, |_| world, origin) && !bake::is_degenerate(&p.mesh));
-    if primitives.len() < before {
-        let message = "its transform leaves no surface of its mesh: not drawn";
-        report.warn(source.file, format!("/nodes/{node}"), message);
-    }
-    DAffine3::from_translation(origin)
 }
 
 /// Adds a mesh to the scene; `None` if there is nothing in it.

@@ -30,7 +30,7 @@ pub(super) struct NormalMapping {
     pub(super) transform: Affine2,
 }
 
-/// Reads meshes, and counts what they hold.
+/// Reads meshes, within the limits of a scene.
 pub(super) struct MeshReader<'a> {
     source: &'a Source<'a>,
     quantized: bool,
@@ -38,8 +38,29 @@ pub(super) struct MeshReader<'a> {
     read: u64,
     vertices: u64,
     triangles: u64,
-    /// Primitives of points and lines, and the place of the first.
-    undrawn: (u64, String),
+}
+
+fn makes_triangles(mode: Mode) -> bool {
+    matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)
+}
+
+/// Warns, once for a file, of primitives of points and lines.
+pub(super) fn warn_of_undrawn(source: &Source<'_>, report: &mut Report) {
+    let mut count = 0_u64;
+    let mut first = None;
+    for (i, mesh) in source.root.meshes.iter().enumerate() {
+        for (number, primitive) in mesh.primitives.iter().enumerate() {
+            let has_positions = primitive.attributes.contains_key(&Checked::Valid(Semantic::Positions));
+            if matches!(primitive.mode, Checked::Valid(mode) if has_positions && !makes_triangles(mode)) {
+                count += 1;
+                first.get_or_insert((i, number));
+            }
+        }
+    }
+    if let Some((i, number)) = first {
+        let message = format!("{count} primitives of points or lines are not drawn");
+        report.warn(source.file, format!("/meshes/{i}/primitives/{number}"), message);
+    }
 }
 
 /// How often vertices may be read on average, against small files that make endless work.
@@ -51,7 +72,7 @@ const MOST_SETS: u32 = 8;
 impl<'a> MeshReader<'a> {
     pub(super) fn new(source: &'a Source<'a>) -> Self {
         let quantized = source.uses("KHR_mesh_quantization");
-        Self { source, quantized, read: 0, vertices: 0, triangles: 0, undrawn: (0, String::new()) }
+        Self { source, quantized, read: 0, vertices: 0, triangles: 0 }
     }
 
     /// Reads the primitives of a mesh that make triangles, with its morph targets by `weights` (the mesh's own where
@@ -73,14 +94,6 @@ impl<'a> MeshReader<'a> {
             primitives.extend(self.primitive(number, place, primitive, weights, report)?);
         }
         Ok(primitives)
-    }
-
-    /// Warns of what cannot be drawn.
-    pub(super) fn finish(self, report: &mut Report) {
-        if self.undrawn.0 > 0 {
-            let message = format!("{} primitives of points or lines are not drawn", self.undrawn.0);
-            report.warn(self.source.file, self.undrawn.1, message);
-        }
     }
 
     fn primitive(
@@ -159,11 +172,7 @@ impl<'a> MeshReader<'a> {
             Some(index) => attributes.indices(index, count)?,
             None => (0..count as u32).collect(),
         };
-        if matches!(mode, Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
-            if self.undrawn.0 == 0 {
-                self.undrawn.1 = place;
-            }
-            self.undrawn.0 += 1;
+        if !makes_triangles(mode) {
             return Ok(None);
         }
         if mode == Mode::Triangles && !indices.len().is_multiple_of(3) {

@@ -31,6 +31,8 @@ mod mesh;
 mod node;
 mod source;
 mod tangent;
+#[cfg(test)]
+mod tests;
 mod texture;
 mod uri;
 
@@ -57,9 +59,13 @@ pub use extensions::{EXTENSIONS, Extension, find as find_extension};
 /// If the file or one of its buffers cannot be read, breaks the format, exceeds the limits, or requires an extension
 /// that is not supported. Images that cannot be read are warnings.
 pub fn read(path: &Path, options: &Options) -> Result<Imported, ImportError> {
-    let bytes = files::read(path, &options.limits)?;
-    let (text, bin) = if glb::is_glb(&bytes) {
-        match glb::version(&bytes) {
+    read_bytes(&files::read(path, &options.limits)?, path, options)
+}
+
+/// As [`read`], of the bytes of the file.
+pub(crate) fn read_bytes(bytes: &[u8], path: &Path, options: &Options) -> Result<Imported, ImportError> {
+    let (text, bin) = if glb::is_glb(bytes) {
+        match glb::version(bytes) {
             Some(1) => return Err(json::too_old(path, "1.0 (binary)")),
             Some(2) | None => {}
             Some(other) => {
@@ -67,10 +73,10 @@ pub fn read(path: &Path, options: &Options) -> Result<Imported, ImportError> {
                 return Err(ImportError::unsupported(path, "", cause));
             }
         }
-        let glb = glb::split(&bytes).map_err(|cause| ImportError::invalid(path, "", cause))?;
+        let glb = glb::split(bytes).map_err(|cause| ImportError::invalid(path, "", cause))?;
         (glb.json, glb.bin)
     } else {
-        (&bytes[..], None)
+        (bytes, None)
     };
     let json::Document { root, value, animations } = json::parse(path, text)?;
     let mut report = Report { animations, ..Report::default() };

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use gltf::json::{Index, Root, buffer};
 
+use super::accessor::ZeroBudget;
 use super::uri::{self, Uri};
 use crate::files::{self, Folder};
 use crate::{ErrorKind, ImportError, Limits, Report};
@@ -16,6 +17,7 @@ pub(super) struct Source<'a> {
     pub(super) root: &'a Root,
     pub(super) folder: Folder,
     pub(super) limits: &'a Limits,
+    pub(super) zeros: ZeroBudget,
     /// `None`: the file gives no data (a fallback of a compressed buffer).
     buffers: Vec<Option<Cow<'a, [u8]>>>,
 }
@@ -32,12 +34,13 @@ impl<'a> Source<'a> {
         limits: &'a Limits,
         report: &mut Report,
     ) -> Result<Self, ImportError> {
-        let mut source = Self { file, root, folder: Folder::of(file)?, limits, buffers: Vec::new() };
+        let (folder, zeros) = (Folder::of(file)?, ZeroBudget::new(limits));
+        let mut source = Self { file, root, folder, limits, zeros, buffers: Vec::new() };
         let mut total = 0_u64;
         for (i, buffer) in root.buffers.iter().enumerate() {
             let place = format!("/buffers/{i}");
             let bytes = match (&buffer.uri, bin) {
-                (Some(uri), _) => Some(Cow::Owned(source.resource(uri, &format!("{place}/uri"), report)?)),
+                (Some(uri), _) => Some(Cow::Owned(source.resource(uri, &format!("{place}/uri"), limits, report)?)),
                 (None, Some(bin)) if i == 0 => Some(Cow::Borrowed(bin)),
                 (None, _) => None,
             };
@@ -57,7 +60,13 @@ impl<'a> Source<'a> {
     }
 
     /// The data of a URI: of the URI itself or of a file in the model's folder.
-    pub(super) fn resource(&self, text: &str, place: &str, report: &mut Report) -> Result<Vec<u8>, ImportError> {
+    pub(super) fn resource(
+        &self,
+        text: &str,
+        place: &str,
+        limits: &Limits,
+        report: &mut Report,
+    ) -> Result<Vec<u8>, ImportError> {
         match uri::parse(text).map_err(|cause| self.invalid(place, cause))? {
             Uri::Data(bytes) => Ok(bytes),
             Uri::File(name) => {
@@ -66,7 +75,7 @@ impl<'a> Source<'a> {
                     kind => self.at(place, kind),
                 })?;
                 report.reads(&path);
-                files::read(&path, self.limits)
+                files::read(&path, limits)
             }
         }
     }

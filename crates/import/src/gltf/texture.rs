@@ -1,6 +1,7 @@
 //! Textures: images, samplers and transforms of coordinates (glTF 2.0 specification, section 3.8).
 
-use std::collections::BTreeMap;
+use std::borrow::Cow;
+use std::collections::{BTreeMap, HashMap};
 
 use glam::{Affine2, Mat2, Vec2};
 use gltf::json::extensions::texture::TextureTransform;
@@ -13,11 +14,13 @@ use super::json;
 use super::source::Source;
 use crate::image::{self, Encoded};
 use crate::scene::{Channel, Filter, ImageDesc, TextureRef, Wrap};
-use crate::{ImportError, Report};
+use crate::{ImportError, Limits, Report};
 
 /// Textures as materials call for them; images are numbered in the order of their first use.
 pub(super) struct Textures<'a> {
     source: &'a Source<'a>,
+    /// For each image the first of the same data.
+    same: Vec<usize>,
     numbers: BTreeMap<Shown, usize>,
     used: Vec<Shown>,
 }
@@ -50,7 +53,11 @@ impl<'a> From<&'a gltf::json::texture::Info> for Info<'a> {
 
 impl<'a> Textures<'a> {
     pub(super) fn new(source: &'a Source<'a>) -> Self {
-        Self { source, numbers: BTreeMap::new(), used: Vec::new() }
+        let mut first = HashMap::new();
+        let images = source.root.images.iter().enumerate();
+        let same = images
+            .map(|(i, image)| *first.entry((image.uri.as_deref(), image.buffer_view.map(|v| v.value()))).or_insert(i));
+        Self { source, same: same.collect(), numbers: BTreeMap::new(), used: Vec::new() }
     }
 
     /// The reference to a texture; `place` is that of the reference in the file.
@@ -69,10 +76,10 @@ impl<'a> Textures<'a> {
             return Err(self.source.invalid(format!("{place}/index"), cause));
         };
         let shown = match (json::webp_source(texture), texture.source.value()) {
-            (Some(webp), _) => Shown::Image(webp as usize),
+            (Some(webp), _) => Shown::Image(self.same[webp as usize]),
             // The JSON model's mark for "no source".
             (None, source) if source == u32::MAX as usize => Shown::Nothing { texture: info.index.value() },
-            (None, source) => Shown::Image(source),
+            (None, source) => Shown::Image(self.same[source]),
         };
         let next = self.used.len();
         let image = *self.numbers.entry(shown).or_insert_with(|| {
@@ -102,15 +109,22 @@ impl<'a> Textures<'a> {
     pub(super) fn decode(self, report: &mut Report) -> Vec<ImageDesc> {
         let names: Vec<String> = self.used.iter().map(|&i| self.name(i)).collect();
         let mut encoded = Vec::new();
+        // Encoded images are held all at once.
+        let mut left = *self.source.limits;
         for (k, &shown) in self.used.iter().enumerate() {
             let bytes = match shown {
-                Shown::Image(index) => self.bytes(index, report),
+                Shown::Image(index) => self.bytes(index, &left, report),
                 Shown::Nothing { texture } => {
                     Err(self.source.invalid(format!("/textures/{texture}"), "has no image that can be read"))
                 }
             };
             match bytes {
-                Ok(bytes) => encoded.push((k, bytes)),
+                Ok(bytes) => {
+                    if let Cow::Owned(bytes) = &bytes {
+                        left.file_bytes = left.file_bytes.saturating_sub(bytes.len() as u64);
+                    }
+                    encoded.push((k, bytes));
+                }
                 Err(e) => report.warn(e.file, e.place, format!("{}: white is shown instead", e.kind)),
             }
         }
@@ -131,12 +145,12 @@ impl<'a> Textures<'a> {
         images
     }
 
-    fn bytes(&self, index: usize, report: &mut Report) -> Result<Vec<u8>, ImportError> {
+    fn bytes(&self, index: usize, limits: &Limits, report: &mut Report) -> Result<Cow<'a, [u8]>, ImportError> {
         let image = &self.source.root.images[index];
         let place = format!("/images/{index}");
         match (&image.uri, image.buffer_view) {
-            (Some(uri), _) => self.source.resource(uri, &(place + "/uri"), report),
-            (None, Some(view)) => self.source.view(view).map(<[u8]>::to_vec),
+            (Some(uri), _) => self.source.resource(uri, &(place + "/uri"), limits, report).map(Cow::Owned),
+            (None, Some(view)) => self.source.view(view).map(Cow::Borrowed),
             (None, None) => Err(self.source.invalid(place, "has neither a URI nor a buffer view")),
         }
     }

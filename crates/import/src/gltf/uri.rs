@@ -1,5 +1,7 @@
 //! Data URIs (RFC 2397): base64 (RFC 4648) or percent escapes.
 
+use crate::files::percent_escape;
+
 /// What a URI says.
 pub(super) enum Uri<'a> {
     /// Data in the URI itself.
@@ -24,15 +26,12 @@ fn percent(text: &[u8]) -> Result<Vec<u8>, String> {
     let mut bytes = Vec::with_capacity(text.len());
     let mut rest = text;
     while let [first, tail @ ..] = rest {
-        rest = tail;
-        if *first != b'%' {
-            bytes.push(*first);
-            continue;
-        }
-        let code = tail.get(..2).and_then(|code| std::str::from_utf8(code).ok());
-        let byte = code.and_then(|code| u8::from_str_radix(code, 16).ok());
-        bytes.push(byte.ok_or("a '%' in a data URI that is not followed by two hexadecimal digits")?);
-        rest = &tail[2..];
+        let (byte, after) = match first {
+            b'%' => percent_escape(rest).ok_or("a '%' in a data URI that is not followed by two hexadecimal digits")?,
+            _ => (*first, tail),
+        };
+        bytes.push(byte);
+        rest = after;
     }
     Ok(bytes)
 }
@@ -101,6 +100,7 @@ mod tests {
         assert!(matches!(parse("data:application/octet-stream;base64,Zm9v"), Ok(Uri::Data(d)) if d == b"foo"));
         assert!(matches!(parse("data:text/plain,a%20%fF"), Ok(Uri::Data(d)) if d == b"a \xff"));
         assert!(parse("data:,%").is_err() && parse("data:,%4").is_err() && parse("data:,%é").is_err());
+        assert!(parse("data:,%+1").is_err(), "a sign is no digit");
         assert!(parse("data:;base64").is_err());
     }
 }

@@ -11,7 +11,7 @@ use super::texture::Texture;
 use crate::files::{self, Folder};
 use crate::image::{Encoded, decode_all};
 use crate::scene::{AlphaMode, Channel, ImageDesc, MaterialDesc, MaterialModel, PbrMaterial, Pixels, TextureRef};
-use crate::{Limits, Report};
+use crate::{ImportError, Limits, Report};
 
 /// How high the full range of a height map is with `-bm 1`, in widths of the texture: OBJ does not say.
 const BUMP_HEIGHT: f32 = 0.01;
@@ -57,9 +57,24 @@ pub(super) fn map(
 
 fn warn_of_unsupported(entry: &Entry, report: &mut Report) {
     let unset = |value: &str| value.parse() == Ok(0.0_f32);
-    let keys = ["Ps", "Pc", "Pcr", "aniso", "anisor", "map_Ps", "map_Pc", "disp", "decal", "refl"];
+    const KEYS: [&str; 14] = [
+        "Ps",
+        "Pc",
+        "Pcr",
+        "aniso",
+        "anisor",
+        "map_Ps",
+        "map_Pc",
+        "map_Pcr",
+        "map_aniso",
+        "map_anisor",
+        "map_Tr",
+        "disp",
+        "decal",
+        "refl",
+    ];
     let params = &entry.material.unknown_param;
-    let found: Vec<_> = keys.into_iter().filter(|&k| params.get(k).is_some_and(|v| !unset(v))).collect();
+    let found: Vec<_> = KEYS.into_iter().filter(|&k| params.get(k).is_some_and(|v| !unset(v))).collect();
     if !found.is_empty() {
         let message = format!("material '{}': {} not rendered", entry.material.name, found.join(", "));
         report.warn(&entry.file, "", message);
@@ -90,7 +105,14 @@ impl ImageFiles {
 
     fn read(&self, limits: &Limits, report: &mut Report) -> Images {
         self.paths.iter().for_each(|path| report.reads(path));
-        let bytes: Vec<_> = self.paths.iter().map(|path| files::read(path, limits)).collect();
+        let mut left = *limits;
+        let read = |path: &PathBuf| {
+            let bytes = files::read(path, &left)?;
+            // Encoded images are held all at once.
+            left.file_bytes -= bytes.len() as u64;
+            Ok::<_, ImportError>(bytes)
+        };
+        let bytes: Vec<_> = self.paths.iter().map(read).collect();
         let names: Vec<String> = self.paths.iter().map(|p| p.to_string_lossy().into_owned()).collect();
         let sources: Vec<_> =
             names.iter().zip(&bytes).filter_map(|(name, b)| Some(Encoded { name, bytes: b.as_ref().ok()? })).collect();
@@ -206,7 +228,9 @@ impl Mapping<'_> {
         let physical = roughness.is_some() || metallic.is_some() || maps.roughness.is_some() || maps.metallic.is_some();
         let illum = m.illumination_model.unwrap_or(2);
         match illum {
-            4 | 6 | 7 | 9 => {
+            // With a texture of opacity, 4 and 9 are leaves and fences rather than glass.
+            4 | 6 | 7 | 9 if matches!(illum, 6 | 7) || maps.opacity.is_none() => {
+                pbr.metallic = metallic.unwrap_or(0.0);
                 pbr.roughness = roughness.unwrap_or(0.0);
                 pbr.ior = m.optical_density.unwrap_or(1.5).max(1.0);
                 // Light passes two surfaces of a body.
@@ -221,13 +245,18 @@ impl Mapping<'_> {
                         pbr.base_color = filter.extend(1.0);
                     }
                 }
+                self.set_physical_textures(&mut pbr, roughness, metallic);
+                if maps.opacity.is_some() {
+                    self.set_opacity(&mut pbr, None);
+                }
             }
-            3 | 5 if metallic.is_none() => {
+            3 | 5 if metallic.is_none() && maps.metallic.is_none() => {
                 let ks = ks.unwrap_or(kd);
                 let (diffuse, mirrored) = (kd.element_sum(), ks.element_sum());
                 pbr.base_color = (kd + ks).min(Vec3::ONE).extend(1.0);
                 pbr.metallic = if mirrored > 0.0 { mirrored / (diffuse + mirrored) } else { 0.0 };
                 pbr.roughness = roughness.unwrap_or(0.0);
+                self.set_physical_textures(&mut pbr, roughness, metallic);
                 self.set_opacity(&mut pbr, opacity);
             }
             _ => {
@@ -246,7 +275,10 @@ impl Mapping<'_> {
                         set_specular(&mut pbr, ks);
                     }
                 }
-                self.set_textures(&mut pbr, roughness, metallic);
+                self.set_physical_textures(&mut pbr, roughness, metallic);
+                if roughness.is_none() && pbr.roughness_texture.is_none() {
+                    self.set_shininess_texture(&mut pbr);
+                }
                 self.set_opacity(&mut pbr, opacity);
             }
         }
@@ -289,7 +321,8 @@ impl Mapping<'_> {
         if brightest > 0.0 { tf / brightest } else { Vec3::ONE }
     }
 
-    fn set_textures(&mut self, pbr: &mut PbrMaterial, roughness: Option<f32>, metallic: Option<f32>) {
+    /// The textures of `Pr` and `Pm`.
+    fn set_physical_textures(&self, pbr: &mut PbrMaterial, roughness: Option<f32>, metallic: Option<f32>) {
         if let Some(texture) = self.scalar_reference(&self.maps.metallic) {
             pbr.metallic_texture = Some(texture);
             pbr.metallic = metallic.filter(|&m| m > 0.0).unwrap_or(1.0);
@@ -297,21 +330,24 @@ impl Mapping<'_> {
         if let Some(texture) = self.scalar_reference(&self.maps.roughness) {
             pbr.roughness_texture = Some(texture);
             pbr.roughness = roughness.filter(|&r| r > 0.0).unwrap_or(1.0);
-        } else if let (None, Some(texture)) = (roughness, self.scalar_reference(&self.maps.shininess)) {
-            // A share of Ns has no factor of roughness that would do, so the roughness itself becomes the texture.
-            let shininess = self.m.shininess.filter(|&ns| ns > 0.0).unwrap_or(1000.0);
-            let shares = &self.images.descs[texture.image];
-            let image = roughness_image(
-                shares,
-                |share| roughness_of(shininess * (texture.value_offset + texture.value_scale * share)),
-                texture.channel,
-            );
-            self.images.descs.push(image);
-            let image = self.images.descs.len() - 1;
-            pbr.roughness = 1.0;
-            pbr.roughness_texture =
-                Some(TextureRef { image, channel: Channel::Red, value_scale: 1.0, value_offset: 0.0, ..texture });
         }
+    }
+
+    /// A share of Ns has no factor of roughness that would do, so the roughness itself becomes the texture.
+    fn set_shininess_texture(&mut self, pbr: &mut PbrMaterial) {
+        let Some(texture) = self.scalar_reference(&self.maps.shininess) else { return };
+        let shininess = self.m.shininess.filter(|&ns| ns > 0.0).unwrap_or(1000.0);
+        let shares = &self.images.descs[texture.image];
+        let image = roughness_image(
+            shares,
+            |share| roughness_of(shininess * (texture.value_offset + texture.value_scale * share)),
+            texture.channel,
+        );
+        self.images.descs.push(image);
+        let image = self.images.descs.len() - 1;
+        pbr.roughness = 1.0;
+        pbr.roughness_texture =
+            Some(TextureRef { image, channel: Channel::Red, value_scale: 1.0, value_offset: 0.0, ..texture });
     }
 
     fn set_opacity(&self, pbr: &mut PbrMaterial, opacity: Option<f32>) {

@@ -68,9 +68,10 @@ fn origin(model: &Model) -> DVec3 {
 
 /// Colours are painted or photographed: sRGB, as Blender and MeshLab take them.
 fn linear_colors(model: &Model, file: &Path, report: &mut Report) -> Vec<Vec4> {
-    let bytes = model.colors.iter().flatten().any(|&c| c > 1.0);
+    // A little above 1 is a bright colour, to be clamped.
+    let bytes = model.colors.iter().flatten().any(|&c| c > 2.0);
     if bytes {
-        report.warn(file, "", "vertex colours above 1 taken as 0 to 255");
+        report.warn(file, "", "vertex colours above 2 taken as 0 to 255");
     }
     let scale = if bytes { 1.0 / 255.0 } else { 1.0 };
     let linear = |c: f32| srgb::to_linear(f64::from((c * scale).clamp(0.0, 1.0))) as f32;

@@ -11,7 +11,7 @@
 //! | in the file | here |
 //! |---|---|
 //! | `v x y z`, indices from 1 or counted back by negative ones | as they are; an index out of range is an error with its line |
-//! | `v x y z r g b` | vertex colours, sRGB as Blender takes them; 0 to 255 if one exceeds 1 |
+//! | `v x y z r g b` | vertex colours, sRGB as Blender takes them; 0 to 255 if one exceeds 2, else clamped to 1 |
 //! | `v x y z w` | w is for rational surfaces and ignored |
 //! | `vt u v`, also `vt u` | v counted from the top instead; further dimensions are ignored |
 //! | `f` | any number of corners; concave ones are cut by ears in their plane |
@@ -32,7 +32,7 @@
 //! | `Ks`, `map_Ks` | reflectance 0.08 Ks at normal incidence, as Blender maps it: 0.5 is plastic. None for `illum` 0 and 1 |
 //! | `illum` 3, 5 | mirror: base colour Kd + Ks, metallic with the share of Ks in it, roughness 0 |
 //! | `illum` 6, 7 | solid glass of index `Ni`, roughness 0, tinted by `Tf` |
-//! | `illum` 4, 9 | thin glass, of transmission 1 - d if there is a `d` |
+//! | `illum` 4, 9 | thin glass, of transmission 1 - d if there is a `d`; with a `map_d` it is no glass, but what is cut out by it |
 //! | `Tf` | only its hue: some exporters write the share of light that passes, some the opposite |
 //! | `d`, or 1 - `Tr`; `map_d` | alpha, blended; of the image's alpha channel if it has one, else of its luminance |
 //! | `Ke`, `map_Ke` | emitted radiance |
@@ -41,7 +41,7 @@
 //! | `Pr`, `Pm` with maps | roughness, metallic; they win over what Ns and illum say |
 //! | `-s`, `-o`, `-clamp`, `-mm`, `-bm`, `-imfchan` | honoured; `-blendu`, `-boost`, `-texres`, `-colorspace` change nothing here; `-t`, `-type`: warning |
 //! | `Ka`, `sharpness` | nothing: ambient light is traced |
-//! | `Pc`, `Pcr`, `Ps`, `aniso`, `anisor`, `disp`, `decal`, `refl` | not rendered, warning |
+//! | `Pc`, `Pcr`, `Ps`, `aniso`, `anisor` and their maps, `map_Tr`, `disp`, `decal`, `refl` | not rendered, warning |
 //!
 //! All surfaces are seen from both sides, as OBJ knows no other. A texture is looked for beside its library, then
 //! beside the model; if its path leads nowhere or out of the model's folder, its bare name is tried.
@@ -87,9 +87,7 @@ use crate::{ImportError, Imported, Options, Report, SceneDesc};
 /// [`ImportError`] with the line and what is wrong there. Libraries and images that cannot be read are only warnings.
 pub fn read(path: impl AsRef<Path>, options: &Options) -> Result<Imported, ImportError> {
     let path = path.as_ref();
-    let mut imported = read_bytes(files::read(path, &options.limits)?, path, options)?;
-    imported.report.reads(path);
-    Ok(imported)
+    read_bytes(files::read(path, &options.limits)?, path, options)
 }
 
 /// As [`read`], of bytes at hand, not compressed. The files they name are looked for beside `path`, which need not
@@ -100,6 +98,7 @@ pub fn read(path: impl AsRef<Path>, options: &Options) -> Result<Imported, Impor
 pub fn read_bytes(bytes: Vec<u8>, path: impl AsRef<Path>, options: &Options) -> Result<Imported, ImportError> {
     let path = path.as_ref();
     let mut report = Report::default();
+    report.reads(path);
     let text = text::to_utf8(bytes);
     let mut model = parse::parse(&text, path, &options.limits, &mut report)?;
     drop(text);

@@ -146,6 +146,9 @@ fn vertex_colors_are_srgb() {
     let bytes = good("v 0 0 0 255 127.5 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     assert!((mesh(&bytes, 0).colors[0] - colors[0]).abs().max_element() < 1e-6);
     assert_eq!(warnings(&bytes).len(), 1);
+    // One channel a little above 1 makes no other one dark.
+    let bright = good("v 0 0 0 1 0.5 0\nv 1 0 0 1.25 1 1\nv 0 1 0\nf 1 2 3\n");
+    assert_eq!((mesh(&bright, 0).colors[0], mesh(&bright, 0).colors[1]), (colors[0], Vec4::ONE));
 }
 
 #[test]
@@ -366,6 +369,37 @@ fn opacity_maps_are_alpha_or_luminance() {
     assert_eq!((channel(0), channel(1)), (Some(Channel::Alpha), Some(Channel::Luminance)));
     assert_eq!(channel(2), None, "the alpha of the colour image counts once");
     assert!(m.iter().all(|m| m.alpha_mode == AlphaMode::Blend));
+}
+
+#[test]
+fn glass_keeps_its_textures() {
+    let images = [("cut.png", [9, 9, 9, 100]), ("grey.png", [90, 90, 90, 255])];
+    for illum in [4, 9] {
+        let (_, m) = with_library(&format!("newmtl a\nillum {illum}\nmap_d cut.png\nmap_Pr grey.png\nPm 1\n"), &images);
+        assert_eq!((m[0].alpha_mode, m[0].transmission), (AlphaMode::Blend, 0.0), "a leaf, {illum}");
+        assert!(m[0].opacity_texture.is_some() && m[0].roughness_texture.is_some());
+        assert_eq!(m[0].metallic, 1.0);
+        let (_, m) = with_library(&format!("newmtl a\nillum {illum}\nmap_Pr grey.png\nmap_Pm grey.png\n"), &images);
+        assert_eq!((m[0].alpha_mode, m[0].transmission), (AlphaMode::Opaque, 1.0), "a pane, {illum}");
+        assert!(m[0].roughness_texture.is_some() && m[0].metallic_texture.is_some());
+    }
+    for illum in [6, 7] {
+        let (_, m) =
+            with_library(&format!("newmtl a\nillum {illum}\nmap_d cut.png\nmap_Pr grey.png\nPm 0.5\n"), &images);
+        assert_eq!((m[0].transmission, m[0].metallic, m[0].roughness), (1.0, 0.5, 1.0));
+        assert!(m[0].opacity_texture.is_some() && m[0].roughness_texture.is_some());
+    }
+    let (_, m) = with_library("newmtl a\nillum 3\nmap_Pr grey.png\nnewmtl b\nillum 3\nmap_Pm grey.png\n", &images);
+    assert!(m[0].roughness_texture.is_some() && m[1].metallic_texture.is_some(), "mirrors as well");
+}
+
+#[test]
+fn what_is_not_rendered_is_said_once_a_material() {
+    let mtl = "newmtl a\nPs 1\nmap_Pcr a.png\nmap_Tr a.png\nmap_aniso a.png\naniso 0\n";
+    let (imported, _) = with_library(mtl, &[]);
+    let warnings = warnings(&imported);
+    assert_eq!(warnings.len(), 1, "{warnings:?}");
+    assert!(warnings[0].ends_with("material 'a': Ps, map_Pcr, map_aniso, map_Tr not rendered"), "{warnings:?}");
 }
 
 #[test]

@@ -3,47 +3,51 @@
 use std::collections::HashMap;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 use glam::{DAffine3, Vec3};
 
 use super::schema::{Conventions, Film, Model, Object, SceneFile};
 use super::shapes::{self, Body};
-use super::{lights, materials, place};
+use super::{Inclusion, lights, materials, place};
 use crate::files::Folder;
 use crate::open::{Format, read_as};
 use crate::place::Placeable;
-use crate::scene::{
-    EnvironmentDesc, GeometryDesc, ImageDesc, InstanceDesc, MaterialDesc, MaterialModel, MeshDesc, Pixels, SurfaceDesc,
-};
+use crate::scene::{EnvironmentDesc, GeometryDesc, InstanceDesc, MaterialDesc, MaterialModel, MeshDesc, SurfaceDesc};
 use crate::{ErrorKind, ImportError, Imported, Options, Report, SceneDesc, image};
 
-/// Builds the scene of a file. `chain` are the scene files that led here, this one last.
+/// Builds the scene of a file. `inclusion` is how it was reached, itself included.
 pub(super) fn build(
     scene_file: SceneFile,
     path: &Path,
     is_json: bool,
     options: &Options,
-    chain: &[PathBuf],
+    inclusion: &Inclusion,
 ) -> Result<Imported, ImportError> {
     let by_notation = if is_json { Conventions::Reference } else { Conventions::Firsthit };
+    let mut report = Report::default();
+    report.reads(path);
     let mut builder = Builder {
         path,
         folder: Folder::of(path)?,
         options: Options { up: None, ..options.clone() },
-        chain,
+        inclusion,
         reference: scene_file.conventions.unwrap_or(by_notation) == Conventions::Reference,
         scene: SceneDesc::default(),
-        report: Report { files: chain.last().cloned().into_iter().collect(), ..Report::default() },
+        report,
         material_index: HashMap::new(),
         default_material: None,
         images: HashMap::new(),
         models: HashMap::new(),
         triangles: 0,
+        placed_triangles: 0,
+        placed: 0,
     };
     builder.file(scene_file)?;
-    let Builder { mut scene, mut report, .. } = builder;
-    drop_unused_materials(&mut scene);
-    report.triangles_all_scenes = scene.instances.iter().map(|i| triangles(&scene.meshes[i.mesh])).sum();
+    let Builder { mut scene, mut report, placed_triangles, .. } = builder;
+    scene.drop_unused_materials();
+    scene.drop_unused_images();
+    report.triangles_all_scenes = placed_triangles;
     Ok(Imported { scene, report })
 }
 
@@ -51,7 +55,7 @@ pub(super) struct Builder<'a> {
     path: &'a Path,
     folder: Folder,
     options: Options,
-    chain: &'a [PathBuf],
+    inclusion: &'a Inclusion,
     pub(super) reference: bool,
     pub(super) scene: SceneDesc,
     report: Report,
@@ -61,8 +65,19 @@ pub(super) struct Builder<'a> {
     /// By the real path of the file.
     images: HashMap<PathBuf, usize>,
     /// Models that were read already, by file and by what was made of their materials.
-    models: HashMap<ModelKey, Placeable>,
+    models: HashMap<ModelKey, Rc<ReadModel>>,
+    /// In all meshes.
     triangles: u64,
+    /// After instancing, with the scenes of models that are not shown.
+    placed_triangles: u64,
+    /// What counts against the limit of instances.
+    placed: u64,
+}
+
+/// A model whose data the scene has.
+struct ReadModel {
+    parts: Placeable,
+    triangles_all_scenes: u64,
 }
 
 type ModelKey = (PathBuf, Option<usize>, Vec<(String, usize)>);
@@ -93,6 +108,7 @@ impl Builder<'_> {
             let camera = lights::camera(camera).map_err(|e| self.invalid(&place, e))?;
             self.scene.cameras.push(camera);
         }
+        self.placed = (self.scene.cameras.len() + file.lights.len()) as u64;
         self.scene.settings.camera = (!self.scene.cameras.is_empty()).then_some(0);
         for (place, light) in numbered("lights", &file.lights) {
             let light = lights::light(light, self.reference).map_err(|e| self.invalid(&place, e))?;
@@ -141,9 +157,10 @@ impl Builder<'_> {
         let geometry = GeometryDesc { name: name.clone(), surface, material };
         let mesh = MeshDesc { name: name.clone(), geometries: vec![geometry] };
         self.triangles += triangles(&mesh);
+        self.placed_triangles += triangles(&mesh);
         self.scene.meshes.push(mesh);
-        self.scene.instances.push(InstanceDesc { name, mesh: self.scene.meshes.len() - 1, transform });
-        self.check_limits()
+        let instance = InstanceDesc { name, mesh: self.scene.meshes.len() - 1, transform };
+        self.place(&Placeable { instances: vec![instance], ..Placeable::default() }, DAffine3::IDENTITY)
     }
 
     fn model(
@@ -159,17 +176,34 @@ impl Builder<'_> {
             renamed.push((theirs.clone(), self.material_named(place, ours)?));
         }
         let key = (path.canonicalize().map_err(|e| ImportError::io(&path, e))?, material, renamed);
-        let parts = match self.models.get(&key) {
-            Some(parts) => parts.clone(),
+        let read = match self.models.get(&key) {
+            Some(read) => Rc::clone(read),
             None => {
-                let parts = self.read_model(place, &path, material, &key.2)?;
-                self.models.insert(key, parts.clone());
-                parts
+                let read = Rc::new(self.read_model(place, &path, material, &key.2)?);
+                self.models.insert(key, Rc::clone(&read));
+                read
             }
         };
+        self.placed_triangles = self.placed_triangles.saturating_add(read.triangles_all_scenes);
         let turned = model.up.map_or(DAffine3::IDENTITY, |up| up.0.to_y());
-        self.scene.place(parts, transform * turned);
-        self.check_limits()
+        self.place(&read.parts, transform * turned)
+    }
+
+    /// Places parts of the scene, if there is room for them.
+    fn place(&mut self, parts: &Placeable, transform: DAffine3) -> Result<(), ImportError> {
+        self.placed = self.placed.saturating_add(parts.count());
+        let limits = &self.options.limits;
+        for (count, limit, what) in [
+            (self.placed, limits.instances, "instances, lights and cameras"),
+            (self.triangles, limits.elements, "triangles"),
+        ] {
+            if count > limit {
+                let cause = format!("{count} {what} are more than the limit of {limit}");
+                return Err(ImportError::new(self.path, "objects", ErrorKind::Limit(cause)));
+            }
+        }
+        self.scene.place(parts.clone(), transform);
+        Ok(())
     }
 
     fn read_model(
@@ -178,9 +212,10 @@ impl Builder<'_> {
         path: &Path,
         material: Option<usize>,
         renamed: &[(String, usize)],
-    ) -> Result<Placeable, ImportError> {
-        let format = Format::of(path, &self.options.limits)?;
-        let Imported { scene: mut model, report } = read_as(format, path, &self.options, self.chain)?;
+    ) -> Result<ReadModel, ImportError> {
+        let format = Format::of(path)?;
+        let Imported { scene: mut model, report } = read_as(format, path, &self.options, self.inclusion)?;
+        let triangles_all_scenes = report.triangles_all_scenes;
         self.report.absorb(report);
 
         // What each of the model's materials is replaced by.
@@ -199,6 +234,15 @@ impl Builder<'_> {
             replaced[i] = Some(*ours);
         }
 
+        // Images that only replaced materials show are not kept; what the others take, the next models cannot.
+        for (material, _) in model.materials.iter_mut().zip(&replaced).filter(|(_, new)| new.is_some()) {
+            material.model = MaterialModel::Pbr(Box::default());
+        }
+        model.drop_unused_images();
+        let limits = &mut self.options.limits;
+        limits.image_bytes =
+            model.images.iter().fold(limits.image_bytes, |left, i| left.saturating_sub(i.pixels.bytes()));
+
         let (first_mesh, first_material) = (self.scene.meshes.len(), self.scene.materials.len());
         let parts = self.scene.adopt(model);
         self.triangles += self.scene.meshes[first_mesh..].iter().map(triangles).sum::<u64>();
@@ -208,7 +252,7 @@ impl Builder<'_> {
                 None => material,
             };
         }
-        Ok(parts)
+        Ok(ReadModel { parts, triangles_all_scenes })
     }
 
     fn material_named(&self, place: &str, name: &str) -> Result<usize, ImportError> {
@@ -239,7 +283,7 @@ impl Builder<'_> {
         let image = image::read(&path, &self.options.limits)?;
         // What one image takes, the next ones cannot.
         let limits = &mut self.options.limits;
-        limits.image_bytes = limits.image_bytes.saturating_sub(bytes(&image));
+        limits.image_bytes = limits.image_bytes.saturating_sub(image.pixels.bytes());
         self.scene.images.push(image);
         self.images.insert(real, self.scene.images.len() - 1);
         Ok(self.scene.images.len() - 1)
@@ -255,33 +299,9 @@ impl Builder<'_> {
         })
     }
 
-    fn check_limits(&self) -> Result<(), ImportError> {
-        let limits = &self.options.limits;
-        let placed = self.scene.instances.len() + self.scene.lights.len() + self.scene.cameras.len();
-        for (count, limit, what) in [
-            (placed as u64, limits.instances, "instances, lights and cameras"),
-            (self.triangles, limits.elements, "triangles"),
-        ] {
-            if count > limit {
-                let cause = format!("{count} {what} are more than the limit of {limit}");
-                return Err(ImportError::new(self.path, "objects", ErrorKind::Limit(cause)));
-            }
-        }
-        Ok(())
-    }
-
     pub(super) fn invalid(&self, place: &str, cause: impl Into<String>) -> ImportError {
         ImportError::invalid(self.path, place, cause)
     }
-}
-
-fn bytes(image: &ImageDesc) -> u64 {
-    let pixel = match image.pixels {
-        Pixels::Rgba8(_) => 4,
-        Pixels::Rgba16(_) => 8,
-        Pixels::Rgb32F(_) => 12,
-    };
-    u64::from(image.width) * u64::from(image.height) * pixel
 }
 
 /// `name[0]`, `name[1]`, ... with the items.
@@ -314,18 +334,4 @@ fn triangles(mesh: &MeshDesc) -> u64 {
         SurfaceDesc::Shape(_) => 0,
     };
     mesh.geometries.iter().map(of).sum()
-}
-
-/// Leaves out the materials that nothing has: those of a model that were replaced, or that a file only lists.
-fn drop_unused_materials(scene: &mut SceneDesc) {
-    let mut geometries: Vec<_> = scene.meshes.iter_mut().flat_map(|m| &mut m.geometries).collect();
-    let mut used = vec![false; scene.materials.len()];
-    geometries.iter().filter_map(|g| g.material).for_each(|m| used[m] = true);
-    let mut kept = 0;
-    let new_index: Vec<_> = used.iter().map(|&u| (kept, kept += usize::from(u)).0).collect();
-    for material in geometries.iter_mut().filter_map(|g| g.material.as_mut()) {
-        *material = new_index[*material];
-    }
-    let mut used = used.into_iter();
-    scene.materials.retain(|_| used.next().unwrap_or(true));
 }

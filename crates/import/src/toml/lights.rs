@@ -36,7 +36,7 @@ pub(super) fn light(l: &Light, reference: bool) -> Result<LightDesc, String> {
             LightKind::Point { position: position.0, intensity: intensity.0, range: range(r)? }
         }
         schema::LightKind::Directional { direction, irradiance, angle_deg } => LightKind::Directional {
-            direction: direction.0.try_normalize().ok_or("'direction' must not be zero")?,
+            direction: place::unit(direction.0).ok_or("'direction' must not be zero")?,
             irradiance: irradiance.0,
             angle: within("angle_deg", angle_deg, 0.0, 0.0, 180.0)?.to_radians(),
         },
@@ -72,7 +72,8 @@ pub(super) fn light(l: &Light, reference: bool) -> Result<LightDesc, String> {
 }
 
 fn towards(from: DVec3, target: DVec3, what: &str) -> Result<DVec3, String> {
-    (target - from).try_normalize().ok_or_else(|| format!("'{what}' and 'target' must be different points"))
+    place::unit(target - from)
+        .ok_or_else(|| format!("'{what}' and 'target' must be different points at a finite distance"))
 }
 
 impl Builder<'_> {

@@ -17,37 +17,66 @@ mod shapes;
 mod tests;
 mod values;
 
+use std::cell::Cell;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 use crate::{ErrorKind, ImportError, Imported, Options, files};
 use schema::SceneFile;
 
 /// How deep scene files may include scene files: each level costs stack.
-const MAX_INCLUDED: usize = 16;
+const DEEPEST: usize = 16;
+
+/// How many scene files may be read for one: those that are included from several files are read for each of them.
+const MOST_INCLUDED: usize = 4096;
+
+/// How a scene file is reached.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Inclusion {
+    /// The real paths of the scene files that led here, outermost first.
+    chain: Vec<PathBuf>,
+    /// How many were read in all.
+    read: Rc<Cell<usize>>,
+}
+
+impl Inclusion {
+    /// One file further.
+    fn add(&self, real: &Path, options: &Options) -> Result<Self, ErrorKind> {
+        if self.chain.iter().any(|p| p == real) {
+            return Err(ErrorKind::Invalid("this scene file includes itself".to_owned()));
+        }
+        let depth = DEEPEST.min(options.limits.depth as usize);
+        if self.chain.len() >= depth {
+            return Err(ErrorKind::Limit(format!("scene files include scene files more than {depth} deep")));
+        }
+        self.read.set(self.read.get() + 1);
+        if self.read.get() > MOST_INCLUDED {
+            return Err(ErrorKind::Limit(format!("scene files include each other more than {MOST_INCLUDED} times")));
+        }
+        Ok(Self { chain: [&self.chain[..], &[real.to_owned()]].concat(), read: Rc::clone(&self.read) })
+    }
+}
 
 /// Reads a scene file.
 ///
 /// # Errors
-/// With the line of what breaks the schema, or the element (`objects[2]`) of what makes no sense.
+/// With the line of what breaks the schema (in TOML, of the table it is in), or the element (`objects[2]`) of what makes no sense.
 pub fn read(path: &Path, options: &Options) -> Result<Imported, ImportError> {
-    read_included(path, options, &[])
+    read_bytes(&files::read(path, &options.limits)?, path, options, &Inclusion::default())?.finished(path, options)
 }
 
-/// As [`read`], for a file that `including` led to, outermost first.
-pub(crate) fn read_included(path: &Path, options: &Options, including: &[PathBuf]) -> Result<Imported, ImportError> {
+/// As [`read`], of the bytes of a file that others may have led to; unfinished.
+pub(crate) fn read_bytes(
+    bytes: &[u8],
+    path: &Path,
+    options: &Options,
+    including: &Inclusion,
+) -> Result<Imported, ImportError> {
     let real = path.canonicalize().map_err(|e| ImportError::io(path, e))?;
-    if including.contains(&real) {
-        return Err(ImportError::invalid(path, "", "this scene file includes itself"));
-    }
-    let depth = MAX_INCLUDED.min(options.limits.depth as usize);
-    if including.len() >= depth {
-        let cause = format!("scene files include scene files more than {depth} deep");
-        return Err(ImportError::new(path, "", ErrorKind::Limit(cause)));
-    }
+    let inclusion = including.add(&real, options).map_err(|kind| ImportError::new(path, "", kind))?;
     let is_json = files::format_extension(path) == "json";
-    let file = parse(path, &files::read(path, &options.limits)?, is_json)?;
-    let chain = [including, &[real]].concat();
-    build::build(file, path, is_json, options, &chain)
+    let file = parse(path, bytes, is_json)?;
+    build::build(file, path, is_json, options, &inclusion)
 }
 
 fn parse(path: &Path, bytes: &[u8], is_json: bool) -> Result<SceneFile, ImportError> {

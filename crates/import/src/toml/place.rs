@@ -31,9 +31,8 @@ pub(super) fn affine(t: &Transform) -> Result<DAffine3, String> {
         let scale = t.scale.map_or(DVec3::ONE, |s| s.0);
         DAffine3 { matrix3: rotation * DMat3::from_diagonal(scale), translation }
     };
-    let det = m.matrix3.determinant();
-    if det == 0.0 || !m.inverse().is_finite() || !m.is_finite() {
-        return Err("the transform cannot be undone: it makes the object flat (a scale of 0?) or too large".to_owned());
+    if !m.matrix3.determinant().is_finite() || !m.is_finite() {
+        return Err("the transform makes the object too large".to_owned());
     }
     Ok(m)
 }
@@ -58,12 +57,17 @@ fn sin_cos_deg(degrees: f64) -> (f64, f64) {
     }
 }
 
+/// A vector's direction, also where the square of its length is not to be had. `None` if it has none.
+pub(super) fn unit(v: DVec3) -> Option<DVec3> {
+    (v / v.abs().max_element()).try_normalize()
+}
+
 /// The rotation that turns +Z to `direction`, and +Y as far up as that allows. `None` if `direction` is zero, or if the
 /// given `up` is parallel to it; without one, +Y is up, or -Z for what looks straight up or down.
 pub(super) fn facing(direction: DVec3, up: Option<DVec3>) -> Option<DMat3> {
-    let z = direction.try_normalize()?;
+    let z = unit(direction)?;
     let side = |up: DVec3| {
-        let x = up.try_normalize()?.cross(z);
+        let x = unit(up)?.cross(z);
         (x.length() > 1e-9).then(|| x.normalize())
     };
     let x = match up {
@@ -86,7 +90,7 @@ pub(super) fn camera(origin: DVec3, target: DVec3, up: Option<DVec3>) -> Result<
 pub(super) fn between(from: DVec3, to: DVec3) -> Result<(DAffine3, f64), String> {
     let axis = to - from;
     let length = axis.length();
-    let Some(direction) = axis.try_normalize().filter(|_| length.is_finite()) else {
+    let Some(direction) = unit(axis).filter(|_| length.is_finite()) else {
         return Err("'from' and 'to' must be different points at a finite distance".to_owned());
     };
     Ok((DAffine3::from_rotation_translation(DQuat::from_rotation_arc(DVec3::Y, direction), from), length))

@@ -492,6 +492,60 @@ fn a_doubling_of_includes_stops_at_the_limit() {
 }
 
 #[test]
+fn long_names_count_against_the_limit() {
+    let (dir, path) = folder("scene.toml", "");
+    let model = "{ shape = 'model', file = 'part.toml' }";
+    fs::write(&path, format!("objects = [{}]", [model; 100].join(", "))).expect("file");
+    let limit = Options { up: None, limits: Limits { instances: 1000, ..Limits::default() } };
+    for (length, fits) in [(9, true), (9000, false)] {
+        let name = "n".repeat(length);
+        let ball = format!("objects = [{{ shape = 'sphere', center = [0, 0, 0], radius = 1, name = '{name}' }}]");
+        fs::write(dir.path().join("part.toml"), ball).expect("file");
+        assert_eq!(open(&path, &limit).is_ok(), fits);
+    }
+}
+
+#[test]
+fn scene_files_that_hold_nothing_are_not_read_without_end() {
+    let (dir, path) = folder("a0.toml", "");
+    for i in 0..15 {
+        for side in ["a", "b"] {
+            let model = |side: &str| format!("{{ shape = 'model', file = '{side}{}.toml' }}", i + 1);
+            let text = format!("objects = [{}, {}]", model("a"), model("b"));
+            fs::write(dir.path().join(format!("{side}{i}.toml")), text).expect("file");
+        }
+    }
+    for side in ["a15.toml", "b15.toml"] {
+        fs::write(dir.path().join(side), "").expect("file");
+    }
+    let e = open(&path, &Options::default()).expect_err("2^15 ways lead to the last");
+    assert!(matches!(e.kind, ErrorKind::Limit(_)), "{e}");
+}
+
+#[test]
+fn directions_between_points_far_apart_are_found() {
+    let scene = toml(
+        "lights = [
+            { type = 'rectangle', center = [0, 1e300, 0], target = [0, 0, 0], up = [1e-200, 0, 0], width = 1,
+              height = 1, radiance = 1 },
+            { type = 'directional', direction = [0, -1e-300, 0], irradiance = 1 },
+         ]
+         camera = { origin = [0, 0, 1e200], target = [0, 0, 0] }",
+    );
+    let LightKind::Rectangle { edge_u, edge_v, .. } = scene.lights[0].kind else { panic!("a rectangle") };
+    assert!(near(edge_u.cross(edge_v), [0.0, -1.0, 0.0]));
+    assert!(matches!(scene.lights[1].kind, LightKind::Directional { direction: DVec3::NEG_Y, .. }));
+    assert_eq!(scene.cameras[0].transform.matrix3.z_axis, DVec3::Z);
+    let e = read(
+        "a.toml",
+        "lights = [{ type = 'spot', position = [1e308, 0, 0], target = [-1e308, 0, 0], \
+                            intensity = 1, inner_deg = 1, outer_deg = 2 }]",
+    );
+    let e = e.expect_err("too far apart").to_string();
+    assert!(e.ends_with("'position' and 'target' must be different points at a finite distance"), "{e}");
+}
+
+#[test]
 fn the_whole_scene_is_turned_upright() {
     let (_dir, path) = folder(
         "scene.toml",

@@ -1,0 +1,101 @@
+//! Whole files: what they may cost, and what is said of them.
+
+use std::fs;
+
+use serde_json::{Value, json};
+
+use crate::{ErrorKind, ImportError, Imported, Limits, Options};
+
+/// Reads a file beside images that are hard to compress.
+fn read(document: &Value, limits: Limits) -> Result<Imported, ImportError> {
+    let dir = tempfile::tempdir().expect("temporary folder");
+    for (k, name) in ["a.png", "b.png", "c.png"].into_iter().enumerate() {
+        let noise =
+            |x: u32, y: u32| image::Rgb([x * 97 + y * 31, x * y * 53, x * 7 + y * 89 + k as u32].map(|c| c as u8));
+        image::RgbImage::from_fn(24, 24, noise).save(dir.path().join(name)).expect("image");
+    }
+    let path = dir.path().join("made.gltf");
+    fs::write(&path, document.to_string()).expect("file");
+    super::read(&path, &Options { limits, up: None })
+}
+
+#[test]
+fn zeros_are_limited_for_all_accessors_together() {
+    // Each primitive is 100 points of twelve bytes, of which the file has none.
+    let file = |primitives: usize| {
+        json!({
+            "asset": {"version": "2.0"},
+            "accessors": [{"type": "VEC3", "componentType": 5126, "count": 100}],
+            "meshes": [{"primitives": vec![json!({"attributes": {"POSITION": 0}}); primitives]}],
+        })
+    };
+    let limits = Limits { file_bytes: 3600, ..Limits::default() };
+    assert!(read(&file(3), limits).is_ok());
+    let e = read(&file(4), limits).expect_err("too much");
+    assert!(matches!(e.kind, ErrorKind::Limit(_)) && e.place == "/accessors/0", "{e}");
+}
+
+/// A material for each texture, a texture for each image.
+fn painted(images: &Value) -> Value {
+    let count = images.as_array().map_or(0, Vec::len);
+    let paint = |i: usize| json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": i}}});
+    json!({
+        "asset": {"version": "2.0"},
+        "images": images,
+        "textures": (0..count).map(|i| json!({"source": i})).collect::<Vec<_>>(),
+        "materials": (0..count).map(paint).collect::<Vec<_>>(),
+    })
+}
+
+#[test]
+fn images_of_one_file_are_one() {
+    let images = json!([{"uri": "a.png"}, {"uri": "b.png"}, {"uri": "a.png", "name": "again"}]);
+    let scene = read(&painted(&images), Limits::default()).expect("readable").scene;
+    assert_eq!(scene.images.iter().map(|i| i.name.as_str()).collect::<Vec<_>>(), ["a.png", "b.png"]);
+}
+
+#[test]
+fn encoded_images_are_limited_together() {
+    // Other spellings of a path are other files to the reader.
+    let images = json!([{"uri": "a.png"}, {"uri": "b.png"}, {"uri": "./a.png"}, {"uri": "./b.png"}]);
+    let all = read(&painted(&images), Limits::default()).expect("readable");
+    assert_eq!((all.scene.images.len(), all.report.more_warnings, all.report.warnings.len()), (4, 0, 0));
+    // Each takes more than a kilobyte.
+    let tight = read(&painted(&images), Limits { file_bytes: 3000, ..Limits::default() }).expect("readable");
+    let limit = |w: &&crate::Warning| w.message.contains("bytes, the most that is read: white is shown instead");
+    assert!(tight.report.warnings.iter().filter(limit).count() >= 2, "{:?}", tight.report.warnings);
+}
+
+#[test]
+fn points_and_lines_are_counted_once() {
+    let file = json!({
+        "asset": {"version": "2.0"},
+        "accessors": [{"type": "VEC3", "componentType": 5126, "count": 3}],
+        "meshes": [{"primitives": [
+            {"attributes": {"POSITION": 0}, "mode": 4},
+            {"attributes": {"POSITION": 0}, "mode": 0},
+            {"attributes": {"POSITION": 0}, "mode": 3},
+        ]}],
+        "nodes": [{"mesh": 0, "weights": [0.5]}, {"mesh": 0, "weights": [1.0]}],
+    });
+    let report = read(&file, Limits::default()).expect("readable").report;
+    let said: Vec<String> = report.warnings.iter().map(|w| format!("{}: {}", w.place, w.message)).collect();
+    let undrawn: Vec<_> = said.iter().filter(|w| w.contains("points or lines")).collect();
+    assert_eq!(undrawn, ["/meshes/0/primitives/1: 2 primitives of points or lines are not drawn"], "{said:?}");
+}
+
+#[test]
+fn what_lies_out_of_all_range_is_left_out() {
+    let file = json!({
+        "asset": {"version": "2.0"},
+        "accessors": [{"type": "VEC3", "componentType": 5126, "count": 3}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "nodes": [
+            {"scale": [1e308, 1e308, 1e308], "children": [1]},
+            {"translation": [10.0, 0.0, 0.0], "mesh": 0},
+        ],
+    });
+    let read = read(&file, Limits::default()).expect("readable");
+    assert!(read.scene.instances.is_empty() && read.scene.meshes.is_empty());
+    assert_eq!(read.report.warnings.last().map(|w| w.place.as_str()), Some("/nodes/1"));
+}
