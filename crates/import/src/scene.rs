@@ -69,6 +69,7 @@ pub struct GeometryDesc {
 
 /// The surface of a geometry.
 #[derive(Clone, Debug)]
+#[allow(clippy::large_enum_variant, reason = "one for each part of a mesh: few, beside what triangles hold")]
 pub enum SurfaceDesc {
     /// Indexed triangles. A hit's `primitive` is the index of the triangle.
     Triangles(TriangleMesh),

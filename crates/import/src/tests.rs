@@ -184,6 +184,22 @@ fn the_limit_on_images_counts_for_all_models_of_a_scene() {
 }
 
 #[test]
+fn encoded_images_of_obj_are_limited_together() {
+    let dir = folder(&[
+        ("a.obj", &format!("mtllib a.mtl\n{TRIANGLE}")),
+        ("a.mtl", "newmtl m\nmap_Kd a.png\nmap_Ks b.png\n"),
+        ("a.png", ""),
+        ("b.png", ""),
+    ]);
+    let size = fs::metadata(dir.path().join("a.png")).expect("image").len();
+    for (file_bytes, warned) in [(2 * size, 0), (2 * size - 1, 1)] {
+        let options = Options { limits: Limits { file_bytes, ..Limits::default() }, up: None };
+        let said = warnings(&open(dir.path(), &options).expect("images are not needed"));
+        assert_eq!(said.iter().filter(|w| w.contains("the most that is read")).count(), warned, "{said:?}");
+    }
+}
+
+#[test]
 fn images_of_replaced_materials_are_not_kept() {
     let dir = painted_folder(
         "objects = [
