@@ -118,7 +118,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
     /// lost on what lies below the horizon or reflects little.
     fn surroundings(&mut self, lit: &Lit<'_>) -> Vec3 {
         /// Half of them drawn from the map, half by the cosine.
-        const CANDIDATES: u32 = 8;
+        const CANDIDATES: u32 = 4;
         let stage = self.stage;
         let Some(environment) = stage.lights.environment.as_ref().filter(|_| stage.lights.sample_environment) else {
             return Vec3::ZERO;

@@ -37,8 +37,8 @@ const PANELS: [Panel; 5] = [
 
 /// The studio as a map by longitude and latitude: width, height, pixels.
 pub(super) fn bake() -> (usize, usize, Arc<[[f32; 3]]>) {
-    const WIDTH: usize = 1024;
-    const HEIGHT: usize = 512;
+    const WIDTH: usize = 256;
+    const HEIGHT: usize = 128;
     let pixels = (0..WIDTH * HEIGHT)
         .map(|i| {
             let u = ((i % WIDTH) as f32 + 0.5) / WIDTH as f32;
