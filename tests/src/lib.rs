@@ -15,15 +15,26 @@ use std::path::{Path, PathBuf};
 /// If there is none though `FIRSTHIT_REQUIRE_SHARED` is 1, so that no test is skipped unseen.
 #[must_use]
 pub fn shared() -> Option<PathBuf> {
-    // Worktrees lie one level deeper than the workspace.
-    let up = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().skip(2);
-    let folder = std::env::var_os("FIRSTHIT_SHARED")
-        .map(PathBuf::from)
-        .or_else(|| up.take(3).map(|p| p.join("shared")).find(|p| p.is_dir()));
-    if let Some(folder) = folder.filter(|f| f.is_dir()) {
+    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared");
+    let folder = std::env::var_os("FIRSTHIT_SHARED").map_or_else(beside, PathBuf::from);
+    if folder.is_dir() {
         return Some(folder);
     }
     assert!(std::env::var_os("FIRSTHIT_REQUIRE_SHARED").is_none_or(|v| v != "1"), "no folder of public data");
-    eprintln!("skipped: no folder of public data (FIRSTHIT_SHARED names it)");
+    let test = std::thread::current().name().unwrap_or("a test").to_owned();
+    summary(&format!("skipped: {test}: no folder of public data (FIRSTHIT_SHARED names it)"));
     None
+}
+
+/// Prints what a run over a corpus came to, and adds it to the file that `FIRSTHIT_SUMMARY` names, if it names one: the
+/// output of a test that passes is not shown.
+pub fn summary(text: &str) {
+    println!("{text}");
+    if let Some(path) = std::env::var_os("FIRSTHIT_SUMMARY")
+        && let Ok(mut file) = std::fs::OpenOptions::new().create(true).append(true).open(path)
+    {
+        use std::io::Write;
+        // One write, so that tests that end together do not mix their lines.
+        let _ = file.write_all(format!("{text}\n").as_bytes());
+    }
 }

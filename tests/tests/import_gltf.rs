@@ -138,7 +138,9 @@ fn every_file_gives_the_right_answer_or_a_clear_error() {
         }
         *(if result.is_ok() { &mut loaded } else { &mut refused }) += 1;
     }
-    println!("{loaded} loaded, {refused} refused, {absent} of the table's files not there");
+    firsthit_tests::summary(&format!(
+        "glTF files: {loaded} loaded, {refused} refused, skipped: {absent} of the table's files that are not there"
+    ));
     println!("{} disagreements\n{}", wrong.len(), wrong.join("\n"));
     if let Some(bytes) = peak_memory() {
         println!("at most {} MB of memory", bytes >> 20);
@@ -711,4 +713,23 @@ fn collect_numbers<'a>(value: &'a mut Value, numbers: &mut Vec<&'a mut Value>) {
         Value::Number(_) => numbers.push(value),
         _ => {}
     }
+}
+
+/// `FIRSTHIT_BLESS=1` writes the page anew.
+#[test]
+fn the_page_of_extensions_is_the_table() {
+    let mut page = String::from(
+        "# glTF extensions\n\nWhat firsthit does with each, from the table that its reader uses \
+         (`crates/import/src/gltf/extensions.rs`).\n\nA file that *requires* an unsupported or unknown extension is \
+         refused with an error that names it; one that only uses it is read with a warning.\n\n| extension | support | \
+         what is done |\n|---|---|---|\n",
+    );
+    for extension in gltf::EXTENSIONS {
+        page += &format!("| `{}` | {} | {} |\n", extension.name, extension.support.name(), extension.note);
+    }
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/gltf-extensions.md");
+    if std::env::var_os("FIRSTHIT_BLESS").is_some_and(|v| v == "1") {
+        fs::write(&path, &page).unwrap();
+    }
+    assert_eq!(fs::read_to_string(&path).unwrap().replace('\r', ""), page, "run with FIRSTHIT_BLESS=1");
 }

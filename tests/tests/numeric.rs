@@ -2,10 +2,11 @@
 //! that leave shapes.
 
 use firsthit_accel::{BuildOptions, Geometry, SceneBuilder};
+use firsthit_geometry::exact::{ExactHit, ExactRay};
 use firsthit_geometry::shapes::{Cuboid, Quadric, Solid, Sphere};
 use firsthit_geometry::{Precision, Ray, Shape};
-use firsthit_tests::corpus::{self, Case, Engine};
-use glam::{DAffine3, DQuat, DVec3};
+use firsthit_tests::corpus::{self, Case, Engine, Outcome, Primitive};
+use glam::{DAffine3, DQuat, DVec3, Vec3};
 use proptest::prelude::*;
 
 fn cases() -> Vec<Case> {
@@ -16,12 +17,13 @@ fn cases() -> Vec<Case> {
 fn check(name: &str, engine: Engine) {
     let cases = cases();
     let mut failures = Vec::new();
-    println!("{name}:");
+    let mut table = format!("hard cases, {name}:");
     for precision in Precision::ALL {
-        let summary = corpus::run(&cases, precision, engine);
-        print!("{summary}");
-        failures.extend(summary.failures);
+        let run = corpus::run(&cases, precision, engine);
+        table += &format!("\n{}", run.to_string().trim_end());
+        failures.extend(run.failures);
     }
+    firsthit_tests::summary(&table);
     assert!(failures.is_empty(), "{} required answers are wrong:\n{}", failures.len(), failures.join("\n"));
 }
 
@@ -38,6 +40,37 @@ fn box_tests_of_the_trees_pass_the_hard_cases() {
 #[test]
 fn scenes_pass_the_hard_cases() {
     check("scenes", corpus::scene);
+}
+
+/// The exact triangle test has every case right, whatever its margin: hit or miss, all nearest triangles, and `t` to the
+/// last bit.
+#[test]
+fn exact_triangles_have_every_case_right() {
+    let (mut ran, mut fallbacks) = (0, 0);
+    for case in cases() {
+        let triangles: Vec<[Vec3; 3]> = match &case.prim {
+            Primitive::Triangle { v } => vec![v.map(corpus::vector)],
+            Primitive::Mesh { verts, tris } => tris.iter().map(|t| t.map(|i| corpus::vector(verts[i]))).collect(),
+            _ => continue,
+        };
+        let valid = triangles.iter().flatten().all(|p| p.is_finite());
+        let ray = ExactRay::new(case.ray).filter(|_| valid);
+        let hits: Vec<_> = triangles.iter().map(|v| ray.and_then(|ray| ray.hit(*v))).collect();
+        let nearest = ray.and_then(|ray| hits.iter().flatten().min_by(|a, b| ray.order(a, b)));
+        let expected = matches!(case.expect.result, Outcome::Hit | Outcome::Either);
+        assert_eq!(nearest.is_some(), expected, "{}", case.id);
+        if let (Some(ray), Some(nearest)) = (ray, nearest) {
+            let first = |hit: &Option<ExactHit>| hit.as_ref().is_some_and(|h| ray.order(h, nearest).is_eq());
+            let ids: Vec<usize> = (0..hits.len()).filter(|i| first(&hits[*i])).collect();
+            assert!(case.expect.ids.is_empty() || case.expect.ids == ids, "{}: {ids:?}", case.id);
+            assert_eq!(Some(nearest.t), case.expect.t_f32.map(|t| t.0), "{}", case.id);
+        }
+        ran += 1;
+        fallbacks += usize::from(hits.iter().flatten().any(|h| h.fallback));
+    }
+    firsthit_tests::summary(&format!(
+        "hard cases, exact triangle test: {ran} ran, {ran} passed, integers were needed in {fallbacks}"
+    ));
 }
 
 /// The suite has teeth: cutting corners, as the fast tier does, shows.

@@ -122,6 +122,9 @@ pub struct Expect {
     /// The nearest hit.
     #[serde(default, deserialize_with = "decimal")]
     pub t: Option<f64>,
+    /// The same, rounded to the nearest `f32`.
+    #[serde(default)]
+    pub t_f32: Option<Bits>,
     /// Where the ray is first in a box.
     #[serde(default, deserialize_with = "decimal")]
     pub t_enter: Option<f64>,
