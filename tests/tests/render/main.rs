@@ -349,7 +349,7 @@ fn back_faces_of_single_sided_materials_are_not_there_for_sight_and_light() {
             ..StageOptions::default()
         };
         let seen = Probe::new(&scene).stage(options).from(DVec3::new(-3.0, 0.5, 0.0)).look(DVec3::ZERO).x;
-        assert_near(seen, arriving * 0.5 / std::f64::consts::PI, 1e-5);
+        assert_near(seen, arriving * 0.5 / PI, 1e-5);
     }
 }
 
