@@ -1,6 +1,7 @@
 //! The glTF reader against every glTF file of the public data: the verdict of Khronos's validator, triangle counts,
 //! time, and what single models are known to hold.
 
+use std::f64::consts::FRAC_1_SQRT_2;
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -420,7 +421,7 @@ fn punctual_lights_stand_in_the_world() {
     let mut file = one_triangle(&json!([
         {"translation": [1, 2, 3], "scale": [5, 5, 5], "extensions": {"KHR_lights_punctual": {"light": 0}}},
         // A quarter turn about X: from -Z to +Y.
-        {"rotation": [0.707_106_781_186_547_6, 0, 0, 0.707_106_781_186_547_6],
+        {"rotation": [FRAC_1_SQRT_2, 0, 0, FRAC_1_SQRT_2],
          "extensions": {"KHR_lights_punctual": {"light": 1}}},
         {"extensions": {"KHR_lights_punctual": {"light": 2}}},
     ]));
