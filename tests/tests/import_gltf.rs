@@ -493,7 +493,7 @@ fn skins_follow_their_joints_and_not_their_node() {
     assert_eq!(bounds(&scene), (DVec3::new(-0.5, 0.0, 0.0), DVec3::new(0.5, 2.0, 0.0)));
     // The upper joint, at (0, 1), turned by 90 degrees about Z: what hangs at it alone, (+-0.5, 2), goes to
     // (-1, 1 +- 0.5). The node's own transform does not count.
-    let half = std::f64::consts::FRAC_1_SQRT_2;
+    let half = FRAC_1_SQRT_2;
     let scene = edited(&path, |v| {
         v["nodes"][2]["rotation"] = json!([0.0, 0.0, half, half]);
         v["nodes"][0]["translation"] = json!([100, 0, 0]);
