@@ -115,9 +115,10 @@ pub(crate) struct OutputArgs {
     #[arg(long, value_name = "EV", default_value = "0", value_parser = values::number, allow_hyphen_values = true)]
     pub(crate) exposure: f64,
 
-    /// How radiance becomes the colours of a PNG: pbr-neutral, agx, srgb or none (linear)
-    #[arg(long, value_name = "NAME", default_value = "pbr-neutral", value_parser = values::tone_mapping)]
-    pub(crate) tone_mapping: ViewTransform,
+    /// How radiance becomes the colours of a PNG: pbr-neutral, agx, srgb or none (linear) [default: pbr-neutral for
+    /// light, srgb for albedo and occlusion, none for other values]
+    #[arg(long, value_name = "NAME", value_parser = values::tone_mapping)]
+    pub(crate) tone_mapping: Option<ViewTransform>,
 
     /// Bits per channel of a PNG
     #[arg(long, value_name = "8|16", default_value = "8", value_parser = values::bit_depth)]

@@ -8,7 +8,8 @@ use firsthit_accel::{BuildOptions, SceneBuilder};
 use firsthit_import::scene::Settings;
 use firsthit_import::{Imported, Report};
 use firsthit_render::{
-    Background, CameraChanges, Clip, RenderOptions, Rendered, Stage, StageOptions, View, ViewTransform,
+    Aov, Background, CameraChanges, Clip, IntegratorChoice, RenderOptions, Rendered, Stage, StageOptions, View,
+    ViewTransform,
     output::{BitDepth, WriteOptions, write_film, write_png},
 };
 
@@ -148,10 +149,11 @@ impl Job<'_> {
     /// Writes the image and what belongs to it; the answer: the files, the image first.
     fn write(&self, rendered: &Rendered) -> Result<Vec<PathBuf>, Failure> {
         let output = &self.args.output;
+        let transform = output.tone_mapping.unwrap_or_else(|| usual_transform(self.args.quality.integrator));
         let view = View {
-            transform: output.tone_mapping,
+            transform,
             exposure: output.exposure as f32,
-            backdrop: self.args.scene.background_color.map(|color| match output.tone_mapping {
+            backdrop: self.args.scene.background_color.map(|color| match transform {
                 ViewTransform::None => color.linear(),
                 _ => color.0,
             }),
@@ -249,5 +251,14 @@ fn camera_changes(args: &CameraArgs) -> CameraChanges {
         elevation: args.camera_elevation_angle.to_radians(),
         zoom: args.camera_zoom_factor,
         orthographic: args.camera_orthographic,
+    }
+}
+
+/// Light is made to look as on a photograph; shares of light keep their value, and other values their number.
+fn usual_transform(integrator: IntegratorChoice) -> ViewTransform {
+    match integrator {
+        IntegratorChoice::AmbientOcclusion | IntegratorChoice::Aov(Aov::Albedo) => ViewTransform::Srgb,
+        IntegratorChoice::Aov(_) => ViewTransform::None,
+        _ => ViewTransform::PbrNeutral,
     }
 }

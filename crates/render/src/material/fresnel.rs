@@ -21,7 +21,8 @@ pub(crate) fn refracted_cos(cos: f32, eta: f32) -> Option<f32> {
 
 /// Reflectance of a dielectric at normal incidence.
 pub(crate) fn normal_incidence(ior: f32) -> f32 {
-    let r = (ior - 1.0) / (ior + 1.0);
+    // An infinite index, by which glTF says that all is reflected, is no quotient of infinities.
+    let r = if ior.is_infinite() { 1.0 } else { (ior - 1.0) / (ior + 1.0) };
     r * r
 }
 
@@ -70,6 +71,13 @@ impl Fresnel {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_infinite_index_reflects_everything() {
+        assert_eq!(normal_incidence(f32::INFINITY), 1.0);
+        assert_eq!(normal_incidence(1.0), 0.0);
+        assert!((normal_incidence(1.5) - 0.04).abs() < 1e-7);
+    }
 
     /// The textbook form by angles, in f64.
     fn by_angles(theta: f64, eta: f64) -> f64 {
