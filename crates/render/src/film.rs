@@ -73,6 +73,29 @@ pub struct Film {
     pixels: Vec<Accumulator>,
 }
 
+/// How a film is cut into bands.
+#[derive(Clone, Copy)]
+struct Cut {
+    window: Crop,
+    layers: usize,
+    rows: u32,
+}
+
+impl Cut {
+    fn new(film: &Film, rows: u32) -> Self {
+        Self { window: film.window, layers: 1 + film.aovs.len(), rows: rows.max(1) }
+    }
+
+    /// Pixels of a band, in all layers; at least 1.
+    fn size(&self) -> usize {
+        (self.window.width as usize * self.layers * self.rows as usize).max(1)
+    }
+
+    fn band<'a>(&self, i: usize, pixels: &'a mut [Accumulator]) -> Band<'a> {
+        Band { window: self.window, first_row: self.window.y + i as u32 * self.rows, layers: self.layers, pixels }
+    }
+}
+
 /// Some rows of a film, for one thread.
 #[derive(Debug)]
 pub struct Band<'a> {
@@ -138,26 +161,14 @@ impl Film {
     /// The film cut into bands of so many rows, each of which may be filled by another thread. Every pixel belongs to
     /// one band, so nothing depends on the order in which they are filled.
     pub fn par_bands_mut(&mut self, rows: u32) -> impl IndexedParallelIterator<Item = Band<'_>> {
-        let (window, layers, rows) = (self.window, 1 + self.aovs.len(), rows.max(1));
-        let size = (window.width as usize * layers * rows as usize).max(1);
-        self.pixels.par_chunks_mut(size).enumerate().map(move |(i, pixels)| Band {
-            window,
-            first_row: window.y + i as u32 * rows,
-            layers,
-            pixels,
-        })
+        let cut = Cut::new(self, rows);
+        self.pixels.par_chunks_mut(cut.size()).enumerate().map(move |(i, pixels)| cut.band(i, pixels))
     }
 
     /// As [`Film::par_bands_mut`], one after another.
     pub fn bands_mut(&mut self, rows: u32) -> impl Iterator<Item = Band<'_>> {
-        let (window, layers, rows) = (self.window, 1 + self.aovs.len(), rows.max(1));
-        let size = (window.width as usize * layers * rows as usize).max(1);
-        self.pixels.chunks_mut(size).enumerate().map(move |(i, pixels)| Band {
-            window,
-            first_row: window.y + i as u32 * rows,
-            layers,
-            pixels,
-        })
+        let cut = Cut::new(self, rows);
+        self.pixels.chunks_mut(cut.size()).enumerate().map(move |(i, pixels)| cut.band(i, pixels))
     }
 
     /// The colour, multiplied by alpha.
