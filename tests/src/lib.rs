@@ -1,10 +1,15 @@
 //! What the tests share: the hard cases, and where public data is found.
 
-pub mod corpus;
-
 pub mod oracle;
 
 use std::path::{Path, PathBuf};
+
+/// The folder of hard cases: `FIRSTHIT_HARD_CASES`, or the one that comes with the tests.
+#[must_use]
+pub fn hard_cases() -> PathBuf {
+    std::env::var_os("FIRSTHIT_HARD_CASES")
+        .map_or_else(|| [env!("CARGO_MANIFEST_DIR"), "corpus"].iter().collect(), PathBuf::from)
+}
 
 /// The folder of public models and references, which a clone does not hold.
 ///

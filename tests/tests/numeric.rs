@@ -5,41 +5,39 @@ use firsthit_accel::{BuildOptions, Geometry, SceneBuilder};
 use firsthit_geometry::exact::{ExactHit, ExactRay};
 use firsthit_geometry::shapes::{Cuboid, Quadric, Solid, Sphere};
 use firsthit_geometry::{Precision, Ray, Shape};
-use firsthit_tests::corpus::{self, Case, Engine, Outcome, Primitive};
+use firsthit_measure::corpus::{self, Case, Engine, Outcome, Primitive};
 use glam::{DAffine3, DQuat, DVec3, Vec3};
 use proptest::prelude::*;
 
 fn cases() -> Vec<Case> {
-    corpus::read(&corpus::folder()).expect("the hard cases can be read")
+    corpus::read(&firsthit_tests::hard_cases()).expect("the hard cases can be read")
 }
 
-/// Prints the table and fails on what the tier must have right.
-fn check(name: &str, engine: Engine) {
+/// Prints the table of each engine and fails on what a tier must have right.
+fn check(engines: impl Iterator<Item = Engine>) {
     let cases = cases();
-    let mut failures = Vec::new();
-    let mut table = format!("hard cases, {name}:");
-    for precision in Precision::ALL {
-        let run = corpus::run(&cases, precision, engine);
-        table += &format!("\n{}", run.to_string().trim_end());
-        failures.extend(run.failures);
+    for engine in engines {
+        let report = corpus::run(&cases, &[engine], &Precision::ALL);
+        firsthit_tests::summary(&format!("hard cases, {engine}:\n{}", report.to_string().trim_end()));
+        let failures: Vec<String> = report.failures.iter().map(ToString::to_string).collect();
+        assert!(failures.is_empty(), "{} required answers are wrong:\n{}", failures.len(), failures.join("\n"));
     }
-    firsthit_tests::summary(&table);
-    assert!(failures.is_empty(), "{} required answers are wrong:\n{}", failures.len(), failures.join("\n"));
 }
 
 #[test]
 fn primitives_pass_the_hard_cases() {
-    check("primitive tests", corpus::primitives);
+    check([Engine::Primitives].into_iter());
 }
 
 #[test]
 fn box_tests_of_the_trees_pass_the_hard_cases() {
-    check("slab tests", corpus::slab);
+    check([Engine::Slabs].into_iter());
 }
 
+/// Every layout, by one ray, a slice of rays, and on several threads.
 #[test]
 fn scenes_pass_the_hard_cases() {
-    check("scenes", corpus::scene);
+    check(Engine::all().into_iter().filter(|e| matches!(e, Engine::Scene(..))));
 }
 
 /// The exact triangle test has every case right, whatever its margin: hit or miss, all nearest triangles, and `t` to the
@@ -77,7 +75,7 @@ fn exact_triangles_have_every_case_right() {
 #[test]
 fn the_fast_tier_is_caught_leaking() {
     let watertight: Vec<Case> = cases().into_iter().filter(|c| c.group == "watertight").collect();
-    let fast = corpus::run(&watertight, Precision::Fast, corpus::primitives);
+    let fast = corpus::run(&watertight, &[Engine::Primitives], &[Precision::Fast]);
     assert!(watertight.is_empty() || !fast.excused.is_empty(), "no case shows the leaks of the shortest formula");
 }
 

@@ -1,6 +1,12 @@
-//! What accuracy costs in time, measured on the user's own model and machine.
+//! What accuracy costs in time, measured on the user's own model and machine; and the hard cases and scenarios that
+//! say what each tier must have right.
 //!
-//! [`result`] is what a measurement comes to: plain data, which reports turn into tables, JSON, charts and pages.
+//! * [`corpus`] runs exact hard cases through every engine at every tier.
+//! * [`mesh`] and [`random`] make input by rule.
+//! * [`result`] is what a measurement comes to: plain data, which reports turn into tables, JSON, charts and pages.
 #![forbid(unsafe_code)]
 
+pub mod corpus;
+pub mod mesh;
+pub mod random;
 pub mod result;

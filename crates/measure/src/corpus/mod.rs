@@ -5,24 +5,17 @@
 
 mod engine;
 mod judge;
+mod read;
 mod run;
-
-use std::{fs, io, path::PathBuf};
 
 use firsthit_geometry::Ray;
 use glam::Vec3;
 use serde::{Deserialize, Deserializer, de};
 
-pub use engine::{Answer, Engine, Found, primitives, scene, slab};
-pub use judge::{Verdict, judge};
-pub use run::{Summary, run};
-
-/// The folder of cases: `FIRSTHIT_HARD_CASES`, or the one that comes with the tests.
-#[must_use]
-pub fn folder() -> PathBuf {
-    std::env::var_os("FIRSTHIT_HARD_CASES")
-        .map_or_else(|| [env!("CARGO_MANIFEST_DIR"), "corpus"].iter().collect(), PathBuf::from)
-}
+pub use engine::{Answer, Engine, Form, Found};
+pub use judge::{Verdict, judge, required};
+pub use read::{CorpusError, read};
+pub use run::{Complaint, Report, Row, run};
 
 /// One case.
 #[derive(Clone, Debug, Deserialize)]
@@ -31,6 +24,8 @@ pub struct Case {
     pub id: String,
     /// What it is about, e.g. `sphere`.
     pub group: String,
+    /// What makes it hard, e.g. `near-tangent`.
+    pub category: String,
     /// The primitive.
     pub prim: Primitive,
     /// The ray.
@@ -190,7 +185,11 @@ pub fn vector(p: Point) -> Vec3 {
 impl<'de> Deserialize<'de> for Bits {
     fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
         let digits = String::deserialize(d)?;
-        u32::from_str_radix(&digits, 16).map(|b| Self(f32::from_bits(b))).map_err(de::Error::custom)
+        let wrong = || de::Error::custom(format!("'{digits}' is not the 8 hexadecimal digits of an f32"));
+        if digits.len() != 8 || !digits.bytes().all(|b| b.is_ascii_hexdigit()) {
+            return Err(wrong());
+        }
+        u32::from_str_radix(&digits, 16).map(|b| Self(f32::from_bits(b))).map_err(|_| wrong())
     }
 }
 
@@ -208,7 +207,7 @@ fn ray<'de, D: Deserializer<'de>>(d: D) -> Result<Ray<f32>, D::Error> {
 
 fn decimal<'de, D: Deserializer<'de>>(d: D) -> Result<Option<f64>, D::Error> {
     let text = Option::<String>::deserialize(d)?;
-    text.map(|t| t.parse().map_err(de::Error::custom)).transpose()
+    text.map(|t| t.parse().map_err(|_| de::Error::custom(format!("'{t}' is not a decimal number")))).transpose()
 }
 
 /// An axis by number or letter.
@@ -224,27 +223,4 @@ fn axis<'de, D: Deserializer<'de>>(d: D) -> Result<usize, D::Error> {
         Axis::Letter(c @ 'x'..='z') => Ok(c as usize - 'x' as usize),
         _ => Err(de::Error::custom("axis must be 0, 1, 2 or x, y, z")),
     }
-}
-
-/// All cases of a folder, in the order of the file names.
-///
-/// # Errors
-/// When the folder has no `.jsonl` file, or a line is not a case (its file and number are named).
-pub fn read(folder: &std::path::Path) -> io::Result<Vec<Case>> {
-    let mut files: Vec<PathBuf> = fs::read_dir(folder)?.map(|e| Ok(e?.path())).collect::<io::Result<_>>()?;
-    files.retain(|f| f.extension().is_some_and(|e| e == "jsonl"));
-    files.sort();
-    let mut cases = Vec::new();
-    for file in files {
-        for (number, line) in fs::read_to_string(&file)?.lines().enumerate() {
-            cases.push(
-                serde_json::from_str(line)
-                    .map_err(|e| io::Error::other(format!("{}, line {}: {e}", file.display(), number + 1)))?,
-            );
-        }
-    }
-    if cases.is_empty() {
-        return Err(io::Error::other(format!("{} holds no case", folder.display())));
-    }
-    Ok(cases)
 }

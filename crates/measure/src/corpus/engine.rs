@@ -1,6 +1,8 @@
 //! Engines: what answers a case.
 
-use firsthit_accel::{BuildOptions, Geometry, Scene, SceneBuilder};
+use std::fmt;
+
+use firsthit_accel::{BuildOptions, Geometry, Layout, Scene, SceneBuilder};
 use firsthit_geometry::shapes::{Cuboid, Disk, Plane, Polygon, Quadric, Sphere};
 use firsthit_geometry::{
     Aabb, Precision, Primitive as _, Ray, Real, Shape, ShapeError, Vector3, slab as slab_test, triangle,
@@ -9,8 +11,82 @@ use glam::{DAffine3, DVec3};
 
 use super::{Case, Clip, Point, Primitive, vector};
 
-/// Answers a case at a tier.
-pub type Engine = fn(&Case, Precision) -> Answer;
+/// What answers a case.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Engine {
+    /// Each primitive by its own test, meshes by brute force.
+    Primitives,
+    /// The slab tests of the trees; they only have boxes.
+    Slabs,
+    /// A scene of one instance: tree, transform and primitive test together.
+    Scene(Layout, Form),
+}
+
+/// How a scene is asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// One ray.
+    One,
+    /// A slice of rays.
+    Slice,
+    /// A slice of rays on several threads.
+    Parallel,
+}
+
+impl Form {
+    /// All forms.
+    pub const ALL: [Self; 3] = [Self::One, Self::Slice, Self::Parallel];
+}
+
+impl Engine {
+    /// All engines: scenes of each layout, asked in each form.
+    #[must_use]
+    pub fn all() -> Vec<Self> {
+        let scenes = Layout::ALL.into_iter().flat_map(|l| Form::ALL.map(|f| Self::Scene(l, f)));
+        [Self::Primitives, Self::Slabs].into_iter().chain(scenes).collect()
+    }
+
+    /// Answers a case at a tier.
+    #[must_use]
+    pub fn answer(self, case: &Case, precision: Precision) -> Answer {
+        match self {
+            Self::Primitives => match precision {
+                Precision::Fast | Precision::Robust => primitive::<f32>(case, precision, &case.ray),
+                _ => primitive::<f64>(case, precision, &case.ray.to_f64()),
+            },
+            Self::Slabs => slab(case, precision),
+            Self::Scene(layout, form) => scene(case, precision, layout, form),
+        }
+    }
+
+    /// The tier whose promises its answers are held to: the boxes of trees are conservative at every tier, so no box
+    /// test promises more than `Double`.
+    #[must_use]
+    pub fn promises(self, precision: Precision) -> Precision {
+        match (self, precision) {
+            (Self::Slabs, Precision::Fast | Precision::Robust) => precision,
+            (Self::Slabs, _) => Precision::Double,
+            _ => precision,
+        }
+    }
+}
+
+impl fmt::Display for Engine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Primitives => f.write_str("primitive tests"),
+            Self::Slabs => f.write_str("slab tests"),
+            Self::Scene(layout, form) => {
+                let form = match form {
+                    Form::One => "one ray",
+                    Form::Slice => "slice",
+                    Form::Parallel => "parallel",
+                };
+                write!(f, "scene {layout:?}, {form}")
+            }
+        }
+    }
+}
 
 /// What an engine makes of a case.
 #[derive(Clone, Debug)]
@@ -23,6 +99,8 @@ pub enum Answer {
     Refused(String),
     /// The engine has no such question, for this reason.
     Skipped(&'static str),
+    /// The engine contradicts itself.
+    Inconsistent(String),
 }
 
 /// A hit. What the engine does not tell is not checked.
@@ -38,20 +116,15 @@ pub struct Found {
     pub normal: Option<DVec3>,
 }
 
-/// Each primitive by its own test, meshes by brute force.
-#[must_use]
-pub fn primitives(case: &Case, precision: Precision) -> Answer {
-    match precision {
-        Precision::Double => primitive::<f64>(case, precision, &case.ray.to_f64()),
-        _ => primitive::<f32>(case, precision, &case.ray),
-    }
-}
-
 fn primitive<R: Real>(case: &Case, precision: Precision, ray: &Ray<R>) -> Answer {
     match &case.prim {
         Primitive::Triangle { v } => triangles::<R>(precision, &[*v], ray),
         Primitive::Mesh { verts, tris } => {
-            triangles(precision, &tris.iter().map(|t| t.map(|i| verts[i])).collect::<Vec<_>>(), ray)
+            let corners = |t: &[usize; 3]| Some([*verts.get(t[0])?, *verts.get(t[1])?, *verts.get(t[2])?]);
+            match tris.iter().map(corners).collect::<Option<Vec<_>>>() {
+                Some(all) => triangles(precision, &all, ray),
+                None => Answer::Refused("a triangle names a vertex that is not there".into()),
+            }
         }
         Primitive::Aabb { min, max } => match Cuboid::<R>::new(cast::<R>(*min), cast::<R>(*max)) {
             Ok(cuboid) => solid_box(&cuboid, ray),
@@ -99,9 +172,7 @@ fn solid_box<R: Real>(cuboid: &Cuboid<R>, ray: &Ray<R>) -> Answer {
     })
 }
 
-/// The slab tests of the trees; they only have boxes.
-#[must_use]
-pub fn slab(case: &Case, precision: Precision) -> Answer {
+fn slab(case: &Case, precision: Precision) -> Answer {
     fn test<R: Real>(min: Point, max: Point, ray: &Ray<R>, padded: bool) -> Answer {
         let bounds = Aabb::<R>::new(cast::<R>(min), cast::<R>(max));
         let hit = if padded { slab_test::padded(&bounds, ray) } else { slab_test::plain(&bounds, ray) };
@@ -111,35 +182,52 @@ pub fn slab(case: &Case, precision: Precision) -> Answer {
     match precision {
         Precision::Fast => test::<f32>(*min, *max, &case.ray, false),
         Precision::Robust => test::<f32>(*min, *max, &case.ray, true),
-        Precision::Double => test::<f64>(*min, *max, &case.ray.to_f64(), true),
+        _ => test::<f64>(*min, *max, &case.ray.to_f64(), true),
     }
 }
 
-/// Through a scene of one instance: tree, transform and primitive test together.
-#[must_use]
-pub fn scene(case: &Case, precision: Precision) -> Answer {
-    match build(&case.prim, precision) {
-        Ok(Some(scene)) => {
-            let ray = case.ray.to_f64();
-            let hit = scene.closest_hit(&ray);
-            assert_eq!(hit.is_some(), scene.any_hit(&ray), "{}: any hit and closest hit disagree", case.id);
-            match hit {
-                Some(hit) => {
-                    let id = matches!(case.prim, Primitive::Mesh { .. }).then_some(hit.id.primitive as usize);
-                    Answer::Hit(Found { t: Some(hit.t), id, ..Found::default() })
-                }
-                None if case.expect.t_enter.is_some() && case.expect.t.is_none() => {
-                    Answer::Skipped("the ray stays inside the box: no surface is crossed")
-                }
-                None => Answer::Miss,
+fn scene(case: &Case, precision: Precision, layout: Layout, form: Form) -> Answer {
+    let scene = match build(&case.prim, precision, layout) {
+        Ok(Some(scene)) => scene,
+        Ok(None) => return Answer::Skipped("no such primitive"),
+        Err(e) => return Answer::Refused(e),
+    };
+    let ray = case.ray.to_f64();
+    let (hit, any) = match form {
+        Form::One => (scene.closest_hit(&ray), scene.any_hit(&ray)),
+        Form::Slice | Form::Parallel => {
+            // Between rays of which one is not valid: neighbours must not matter.
+            let rays = [Ray::new(DVec3::ZERO, DVec3::ZERO), ray, ray];
+            let (mut hits, mut any) = ([None; 3], [false; 3]);
+            if form == Form::Slice {
+                scene.closest_hits(&rays, &mut hits);
+                scene.any_hits(&rays, &mut any);
+            } else {
+                scene.par_closest_hits(&rays, &mut hits);
+                scene.par_any_hits(&rays, &mut any);
             }
+            if hits[0].is_some() || any[0] || hits[1] != hits[2] || any[1] != any[2] {
+                return Answer::Inconsistent(format!("{hits:?} and {any:?} in a batch"));
+            }
+            (hits[1], any[1])
         }
-        Ok(None) => Answer::Skipped("no such primitive"),
-        Err(e) => Answer::Refused(e),
+    };
+    if hit.is_some() != any {
+        return Answer::Inconsistent(format!("closest hit {hit:?}, any hit {any}"));
+    }
+    match hit {
+        Some(hit) => {
+            let id = matches!(case.prim, Primitive::Mesh { .. }).then_some(hit.id.primitive as usize);
+            Answer::Hit(Found { t: Some(hit.t), id, ..Found::default() })
+        }
+        None if case.expect.t_enter.is_some() && case.expect.t.is_none() => {
+            Answer::Skipped("the ray stays inside the box: no surface is crossed")
+        }
+        None => Answer::Miss,
     }
 }
 
-fn build(prim: &Primitive, precision: Precision) -> Result<Option<Scene>, String> {
+fn build(prim: &Primitive, precision: Precision, layout: Layout) -> Result<Option<Scene>, String> {
     let geometry = match prim {
         Primitive::Triangle { v } => {
             Geometry::Triangles { positions: v.iter().map(|p| vector(*p)).collect(), triangles: vec![[0, 1, 2]] }
@@ -157,7 +245,7 @@ fn build(prim: &Primitive, precision: Precision) -> Result<Option<Scene>, String
             None => return Ok(None),
         },
     };
-    let mut builder = SceneBuilder::new(BuildOptions { precision, ..BuildOptions::default() });
+    let mut builder = SceneBuilder::new(BuildOptions { precision, layout, ..BuildOptions::default() });
     let mesh = builder.add_mesh(vec![geometry]);
     builder.add_instance(mesh, DAffine3::IDENTITY);
     builder.build().map(Some).map_err(|e| e.to_string())
