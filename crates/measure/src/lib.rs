@@ -3,10 +3,11 @@
 //!
 //! * [`corpus`] runs exact hard cases through every engine at every tier.
 //! * [`mesh`] and [`random`] make input by rule.
-//! * [`result`] is what a measurement comes to: plain data, which reports turn into tables, JSON, charts and pages.
+//! * [`result`] is what a measurement comes to: plain data, which [`report`] turns into charts and pages.
 #![forbid(unsafe_code)]
 
 pub mod corpus;
 pub mod mesh;
 pub mod random;
+pub mod report;
 pub mod result;

@@ -1,0 +1,13 @@
+//! What was measured, for people: charts and a page.
+
+mod chart;
+mod html;
+mod label;
+mod panel;
+mod scale;
+mod svg;
+mod table;
+mod text;
+
+pub use html::html;
+pub use svg::{Charts, svg};
