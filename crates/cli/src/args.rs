@@ -9,6 +9,7 @@ use firsthit_import::UpAxis;
 use firsthit_render::{CameraChoice, Crop, EffectOverrides, IntegratorChoice, ViewTransform};
 use glam::DVec3;
 
+use crate::accuracy::AccuracyArgs;
 use crate::values::{self, AovList, Color, Hdri, Plane, Resolution};
 
 const EXAMPLES: &str = "\
@@ -64,6 +65,8 @@ pub(crate) enum Command {
     Render(Box<RenderArgs>),
     /// Say what is in a model: triangles, materials, cameras, extensions, effects, quality.
     Inspect(InspectArgs),
+    /// Measure what accuracy costs in time, and check the hard cases.
+    Accuracy(AccuracyArgs),
     /// Print a script that completes this program's options in a shell.
     Completions {
         /// The shell.
@@ -72,7 +75,7 @@ pub(crate) enum Command {
     /// Print a manual page (roff).
     Man {
         /// The page of one command instead of the program's.
-        #[arg(value_parser = ["render", "inspect", "completions", "man"])]
+        #[arg(value_parser = ["render", "inspect", "accuracy", "completions", "man"])]
         command: Option<String>,
     },
 }

@@ -1,6 +1,7 @@
 //! The `firsthit` program: from a model to an image with one command.
 #![forbid(unsafe_code)]
 
+mod accuracy;
 mod args;
 mod config;
 mod console;
@@ -38,6 +39,7 @@ fn run(command: Command, config: Option<&std::path::Path>) -> Result<Exit, Failu
     match command {
         Command::Render(args) => render::run(&args, config),
         Command::Inspect(args) => inspect::run(&args).map(|()| Exit::Done),
+        Command::Accuracy(args) => accuracy::run(&args),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "firsthit", &mut script);

@@ -156,8 +156,8 @@ impl fmt::Display for Report {
         }
         writeln!(
             f,
-            "{:12} {:7} {:>6} {:>9} {:>7}          {:>7} {:>8}",
-            "group", "tier", "cases", "required", "passed", "failed", "skipped"
+            "{:12} {:7} {:>6} {:>9} {:>7} {:9} {:>6} {:>8}",
+            "group", "tier", "cases", "required", "passed", "", "failed", "skipped"
         )?;
         for g in groups.iter().filter(|g| g.skipped < g.cases) {
             #[allow(clippy::cast_precision_loss, reason = "a percentage")]
