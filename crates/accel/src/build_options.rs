@@ -2,6 +2,8 @@
 
 use firsthit_geometry::Precision;
 
+use crate::Guards;
+
 /// How much time a build may take for a better tree.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum BuildQuality {
@@ -37,4 +39,6 @@ pub struct BuildOptions {
     pub quality: BuildQuality,
     /// Memory layout.
     pub layout: Layout,
+    /// Which guards the robust tier has: all, but in measurements.
+    pub guards: Guards,
 }

@@ -1,9 +1,6 @@
 //! Triangle tests by tier, in an object's normalised space.
 
-use firsthit_geometry::{
-    Ray,
-    triangle::{self, Shear},
-};
+use firsthit_geometry::triangle::{self, Shear};
 use glam::{DVec3, Vec3};
 
 use crate::local::LocalRay;
@@ -21,8 +18,12 @@ pub(crate) fn double(v: &[Vec3; 3]) -> [DVec3; 3] {
     [v[0].as_dvec3(), v[1].as_dvec3(), v[2].as_dvec3()]
 }
 
-/// A triangle test. `t` is local and counted from the ray's true origin.
+/// How a tier meets boxes and triangles. `t` is local and counted from the ray's true origin.
 pub(crate) trait Kernel {
+    /// Boxes are met as if larger by all that is rounded, so that none with a hit is missed.
+    const PADDED: bool;
+    /// Hits are kept within their primitive's box: see [`LocalRay::within_box`].
+    const CLAMPED: bool;
     /// What is prepared once per ray and instance.
     type Setup;
     fn setup(ray: &LocalRay) -> Self::Setup;
@@ -34,24 +35,8 @@ pub(crate) trait Kernel {
 pub(crate) struct Fast;
 
 impl Kernel for Fast {
-    type Setup = Ray<f32>;
-
-    #[inline(always)]
-    fn setup(ray: &LocalRay) -> Ray<f32> {
-        Ray::new(ray.origin32, ray.direction32).with_interval(f32::NEG_INFINITY, f32::INFINITY)
-    }
-
-    #[inline(always)]
-    fn test(setup: &Ray<f32>, ray: &LocalRay, vertices: &[Vec3; 3]) -> Option<(f64, f32, f32)> {
-        let hit = triangle::moeller_trumbore(*vertices, setup.origin, setup.direction)?;
-        Some((f64::from(hit.t) + ray.shift, hit.u, hit.v))
-    }
-}
-
-/// Tier `Robust`: the watertight test in `f32`; `t` from the plane and the unrounded ray in `f64`.
-pub(crate) struct Robust;
-
-impl Kernel for Robust {
+    const PADDED: bool = false;
+    const CLAMPED: bool = false;
     type Setup = ();
 
     #[inline(always)]
@@ -59,8 +44,45 @@ impl Kernel for Robust {
 
     #[inline(always)]
     fn test((): &(), ray: &LocalRay, vertices: &[Vec3; 3]) -> Option<(f64, f32, f32)> {
-        let w = ray.shear.weights(relative(vertices, ray.origin32))?;
-        Some((plane(vertices, ray)?, w.u, w.v))
+        let hit = triangle::moeller_trumbore::<f32>(*vertices, ray.origin32, ray.direction32)?;
+        Some((f64::from(hit.t) + ray.shift, hit.u, hit.v))
+    }
+}
+
+/// Tier `Robust` with its guards, see [`crate::Guards`]: all on, it is the watertight test in `f32`, and `t` from the
+/// plane and the unrounded ray in `f64`.
+pub(crate) struct Robust<const PADDING: bool, const WATERTIGHT: bool, const FALLBACK: bool, const PLANE_T: bool>;
+
+impl<const PADDING: bool, const WATERTIGHT: bool, const FALLBACK: bool, const PLANE_T: bool> Kernel
+    for Robust<PADDING, WATERTIGHT, FALLBACK, PLANE_T>
+{
+    const PADDED: bool = PADDING;
+    const CLAMPED: bool = PADDING;
+    type Setup = Shear<f32>;
+
+    #[inline(always)]
+    fn setup(ray: &LocalRay) -> Shear<f32> {
+        Shear::new(ray.direction32)
+    }
+
+    #[inline(always)]
+    fn test(shear: &Shear<f32>, ray: &LocalRay, vertices: &[Vec3; 3]) -> Option<(f64, f32, f32)> {
+        if !WATERTIGHT {
+            let (t, u, v) = Fast::test(&(), ray, vertices)?;
+            return Some((if PLANE_T { plane(vertices, ray)? } else { t }, u, v));
+        }
+        let relative = relative(vertices, ray.origin32);
+        let w = if FALLBACK { shear.weights(relative) } else { shear.weights_unguarded(relative) }?;
+        let t = if PLANE_T {
+            plane(vertices, ray)?
+        } else {
+            // The depth of the weighted point along the axis that the ray follows most.
+            let axis = shear.axis();
+            let [a, b, c] = relative.map(|p| p[axis]);
+            let t = ((1.0 - w.u - w.v) * a + w.u * b + w.v * c) / ray.direction32[axis];
+            f64::from(t) + ray.shift
+        };
+        Some((t, w.u, w.v))
     }
 }
 
@@ -74,6 +96,8 @@ fn plane(vertices: &[Vec3; 3], ray: &LocalRay) -> Option<f64> {
 pub(crate) struct Double;
 
 impl Kernel for Double {
+    const PADDED: bool = true;
+    const CLAMPED: bool = true;
     type Setup = Shear<f64>;
 
     #[inline(always)]

@@ -29,6 +29,7 @@ mod build;
 mod build_options;
 mod builder;
 mod error;
+mod guards;
 mod hit;
 mod instance;
 mod kernel;
@@ -46,6 +47,7 @@ mod visit_order;
 pub use build_options::{BuildOptions, BuildQuality, Layout};
 pub use builder::{Geometry, SceneBuilder};
 pub use error::BuildError;
+pub use guards::Guards;
 pub use hit::{Hit, HitId, SurfacePoint, TraversalCounts};
 pub use scene::{Scene, SceneStats};
 #[doc(hidden)]

@@ -13,8 +13,10 @@
 //! So a triangle that the `f32` test accepts lies within `u|o| + 8uR` of the exact ray ([`LocalRay::reach`]), and boxes
 //! that are met as if they were larger by a little more than that contain every hit: the answer is that of testing all
 //! triangles, whatever the tree.
+//!
+//! Setups that not every tier needs (of the box test, of a triangle test) are made by those who need them.
 
-use firsthit_geometry::{Aabb, Ray, Real, slab::Slabs, transform::Transform, triangle::Shear};
+use firsthit_geometry::{Aabb, Ray, Real, slab::Slabs, transform::Transform};
 use glam::{DVec3, Vec3};
 
 /// Unit roundoff of `f32`.
@@ -64,16 +66,13 @@ pub(crate) struct LocalRay {
     pub(crate) t_scale: f64,
     /// The moved origin is `origin + shift * direction`, and its parameter counts from there.
     pub(crate) shift: f64,
-    exact_slabs: Slabs<f64>,
-    reach: DVec3,
+    moved: DVec3,
+    /// Largest coordinate difference between the moved origin and the object.
+    farthest: f64,
     /// The moved origin in single precision.
     pub(crate) origin32: Vec3,
     /// The direction in single precision.
     pub(crate) direction32: Vec3,
-    /// Setup of the watertight test in single precision.
-    pub(crate) shear: Shear<f32>,
-    /// Setup of the box test; boxes are met as if larger by more than [`LocalRay::reach`].
-    pub(crate) slabs: Slabs<f32>,
 }
 
 impl LocalRay {
@@ -96,29 +95,25 @@ impl LocalRay {
         }
         let moved = origin + direction * shift;
         let farthest = (moved - center).abs().max_element() + half;
-        let reach = moved.abs() * U + 8.0 * U * farthest;
-
         let (origin32, direction32) = (moved.as_vec3(), direction.as_vec3());
-        // Two more u|o| for rounding the origin and adding `delta` to it; 2uR to be above `reach` whatever rounds.
-        let delta = (moved.abs() * (3.0 * U) + (10.0 * U * farthest + TINY)).as_vec3();
-        Some(Self {
-            origin,
-            direction,
-            t_scale: length,
-            shift,
-            exact_slabs: Slabs::new(moved, direction),
-            reach,
-            origin32,
-            direction32,
-            shear: Shear::new(direction32),
-            slabs: Slabs::new(origin32, direction32).widened(delta),
-        })
+        Some(Self { origin, direction, t_scale: length, shift, moved, farthest, origin32, direction32 })
     }
 
     /// How far from the ray, in each axis, a primitive may lie that the tests accept.
     #[inline]
     pub(crate) fn reach(&self) -> DVec3 {
-        self.reach
+        self.moved.abs() * U + 8.0 * U * self.farthest
+    }
+
+    /// Setup of the box test: plain, or `PADDED` so that boxes are met as if larger by more than [`LocalRay::reach`].
+    #[inline(always)]
+    pub(crate) fn slabs<const PADDED: bool>(&self) -> Slabs<f32> {
+        let slabs = Slabs::new(self.origin32, self.direction32);
+        if !PADDED {
+            return slabs;
+        }
+        // Two more u|o| for rounding the origin and adding `delta` to it; 2uR to be above `reach` whatever rounds.
+        slabs.widened((self.moved.abs() * (3.0 * U) + (10.0 * U * self.farthest + TINY)).as_vec3())
     }
 
     /// A parameter of the world's ray as the start of the box tests' interval: not above it.
@@ -146,10 +141,11 @@ impl LocalRay {
     /// Raises `t` (local, counted from the true origin) to where the ray enters the primitive's own box, and lowers it
     /// to where it leaves: the rule by which a hit never lies before a box that holds it, so that skipping boxes cannot
     /// change the answer. The box is widened by [`LocalRay::reach`]; `None` when the ray misses even that.
-    #[inline(never)]
     pub(crate) fn within_box(&self, t: f64, aabb: &Aabb<f64>) -> Option<f64> {
-        let wide = Aabb::new(aabb.min - self.reach(), aabb.max + self.reach());
-        let (enter, leave) = self.exact_slabs.padded(&wide, f64::NEG_INFINITY, f64::INFINITY);
+        let reach = self.reach();
+        let wide = Aabb::new(aabb.min - reach, aabb.max + reach);
+        let slabs = Slabs::new(self.moved, self.direction);
+        let (enter, leave) = slabs.padded(&wide, f64::NEG_INFINITY, f64::INFINITY);
         (enter <= leave).then(|| t.min(leave + self.shift).max(enter + self.shift))
     }
 }

@@ -214,7 +214,7 @@ impl Model {
 
     /// Offers the hits of what is in the tree to the collector.
     #[inline(always)]
-    pub(crate) fn trace<K: Kernel, C: Collector, P: Probe>(
+    pub(crate) fn trace<K: Kernel, C: Collector + ?Sized, P: Probe>(
         &self,
         ray: &LocalRay,
         instance: u32,
@@ -232,7 +232,7 @@ impl Model {
 
     /// A function of its own, so that its loop has the registers.
     #[inline(never)]
-    fn trace_tree<K: Kernel, C: Collector, P: Probe, const SHAPES: bool>(
+    fn trace_tree<K: Kernel, C: Collector + ?Sized, P: Probe, const SHAPES: bool>(
         &self,
         ray: &LocalRay,
         instance: u32,
@@ -243,47 +243,58 @@ impl Model {
         let setup = K::setup(ray);
         let t_min = ray.box_t_min(collector.t_min());
         let t_max = ray.box_t_max(collector.t_max());
+        let mut end = t_max;
         let leaf = |range: Range<usize>, probe: &mut P| {
+            let mut taken = false;
             for place in range {
                 probe.primitive();
                 if SHAPES && let Some(Places::Shape(index)) = self.places.get(self.ids[place].geometry as usize) {
-                    self.offer_shape(*index, ray, instance, precision, collector)?;
+                    taken |= self.offer_shape::<C>(*index, ray, instance, precision, K::CLAMPED, collector)?;
                 } else if let Some((t, u, v)) = K::test(&setup, ray, &self.triangles[place]) {
-                    let [a, b, c] = double(&self.triangles[place]);
-                    let aabb = Aabb::new(a.min(b).min(c), a.max(b).max(c));
-                    if let Some(t) = ray.within_box(t, &aabb) {
+                    let t = if K::CLAMPED { within_triangle(ray, t, &self.triangles[place]) } else { Some(t) };
+                    if let Some(t) = t {
                         let PrimitiveId { geometry, primitive } = self.ids[place];
                         let t = t / ray.t_scale;
-                        collector.offer(Candidate::new(instance, geometry, primitive, t, u, v))?;
+                        taken |= collector.offer(Candidate::new(instance, geometry, primitive, t, u, v))?;
                     }
                 }
             }
-            ControlFlow::Continue(ray.box_t_max(collector.t_max()))
+            if taken {
+                end = ray.box_t_max(collector.t_max());
+            }
+            ControlFlow::Continue(end)
         };
-        traverse(&self.tree, &ray.slabs, t_min, t_max, probe, leaf)
+        if K::PADDED {
+            traverse::<true, _, _, _>(&self.tree, &ray.slabs::<true>(), t_min, t_max, probe, leaf)
+        } else {
+            traverse::<false, _, _, _>(&self.tree, &ray.slabs::<false>(), t_min, t_max, probe, leaf)
+        }
     }
 
     /// Offers the hits of shapes without a finite box.
-    pub(crate) fn trace_unbounded<C: Collector>(
+    pub(crate) fn trace_unbounded<C: Collector + ?Sized>(
         &self,
         ray: &LocalRay,
         instance: u32,
         precision: Precision,
         collector: &mut C,
     ) -> ControlFlow<()> {
-        self.unbounded.iter().try_for_each(|&i| self.offer_shape(i, ray, instance, precision, collector))
+        self.unbounded
+            .iter()
+            .try_for_each(|&i| self.offer_shape(i, ray, instance, precision, false, collector).map_continue(drop))
     }
 
-    /// Offers one shape's hits, nearest first, until one is taken or none is left.
-    fn offer_shape<C: Collector>(
+    /// Offers one shape's hits, nearest first, until one is taken or none is left; whether one was taken.
+    fn offer_shape<C: Collector + ?Sized>(
         &self,
         index: u32,
         ray: &LocalRay,
         instance: u32,
         precision: Precision,
+        clamped: bool,
         collector: &mut C,
-    ) -> ControlFlow<()> {
-        let Some(entry) = self.shapes.get(index as usize) else { return ControlFlow::Continue(()) };
+    ) -> ControlFlow<(), bool> {
+        let Some(entry) = self.shapes.get(index as usize) else { return ControlFlow::Continue(false) };
         let mut local = Ray {
             origin: ray.origin * self.scale,
             direction: ray.direction * self.scale,
@@ -293,20 +304,20 @@ impl Model {
         // No ray meets one of the shapes more often than this.
         for _ in 0..16 {
             let Some(hit) = shape_hit(&entry.shape, &local, precision) else { break };
-            let t = if entry.bounds.is_finite() { ray.within_box(hit.t, &entry.bounds) } else { Some(hit.t) };
+            let t = if clamped { ray.within_box(hit.t, &entry.bounds) } else { Some(hit.t) };
             if let Some(t) = t {
                 let taken = collector.offer(Candidate {
                     normal: hit.normal.unwrap_or(DVec3::ZERO),
                     ..Candidate::new(instance, entry.geometry, 0, t / ray.t_scale, hit.u as f32, hit.v as f32)
                 })?;
                 if taken {
-                    break;
+                    return ControlFlow::Continue(true);
                 }
             }
             // Refused by a filter, perhaps: then the next root may be taken.
             local.t_min = hit.t.next_up();
         }
-        ControlFlow::Continue(())
+        ControlFlow::Continue(false)
     }
 }
 
@@ -321,6 +332,13 @@ impl ModelShape {
     pub(crate) fn is_flat(&self) -> bool {
         self.shape.is_flat()
     }
+}
+
+/// [`LocalRay::within_box`] for a triangle. Apart from the loop, since few triangles come so far.
+#[inline(never)]
+fn within_triangle(ray: &LocalRay, t: f64, vertices: &[Vec3; 3]) -> Option<f64> {
+    let [a, b, c] = double(vertices);
+    ray.within_box(t, &Aabb::new(a.min(b).min(c), a.max(b).max(c)))
 }
 
 /// Shapes are evaluated in `f64` at every tier: by the shortest formulas or by the stable ones.

@@ -16,7 +16,7 @@ use crate::model::{Model, PrimitiveId, Surface, limit};
 use crate::query::{Any, Closest, Collector};
 use crate::stats::{Off, Probe};
 use crate::traverse::traverse;
-use crate::{BuildError, BuildOptions, Geometry, Hit, HitId, TraversalCounts};
+use crate::{BuildError, BuildOptions, Geometry, Guards, Hit, HitId, TraversalCounts};
 
 /// What a scene's trees are like.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -104,7 +104,7 @@ impl Scene {
     /// The nearest hit in the ray's closed interval; `None` also for an invalid ray.
     #[must_use]
     pub fn closest_hit(&self, ray: &Ray<f64>) -> Option<Hit> {
-        self.closest_hit_filtered(ray, None, |_| true)
+        self.closest::<true, _>(ray, None, |_| true, &mut Off)
     }
 
     /// The nearest hit that `accept` accepts, other than on the flat primitive `source` that the ray starts from.
@@ -120,13 +120,14 @@ impl Scene {
         source: Option<HitId>,
         accept: impl FnMut(&Hit) -> bool,
     ) -> Option<Hit> {
-        self.closest(ray, source, accept, &mut Off)
+        self.closest::<false, _>(ray, source, accept, &mut Off)
     }
 
     /// Whether anything lies in the ray's closed interval: true exactly when [`Scene::closest_hit`] finds something.
     #[must_use]
     pub fn any_hit(&self, ray: &Ray<f64>) -> bool {
-        self.any_hit_filtered(ray, None, |_| true)
+        let mut any = Any { t_min: ray.t_min, t_max: ray.t_max, source: None, accept: |_: &Hit| true };
+        self.inner.trace::<true, _, _>(ray, &mut any, &mut Off).is_break()
     }
 
     /// As [`Scene::any_hit`] with a filter: see [`Scene::closest_hit_filtered`]. A filter that always says no is asked
@@ -134,14 +135,14 @@ impl Scene {
     #[must_use]
     pub fn any_hit_filtered(&self, ray: &Ray<f64>, source: Option<HitId>, accept: impl FnMut(&Hit) -> bool) -> bool {
         let mut any = Any { t_min: ray.t_min, t_max: ray.t_max, source: self.flat(source), accept };
-        self.inner.trace(ray, &mut any, &mut Off).is_break()
+        self.inner.trace::<false, _, _>(ray, &mut any, &mut Off).is_break()
     }
 
     /// As [`Scene::closest_hit`], with what it cost.
     #[must_use]
     pub fn closest_hit_counted(&self, ray: &Ray<f64>) -> (Option<Hit>, TraversalCounts) {
         let mut counts = TraversalCounts::default();
-        let hit = self.closest(ray, None, |_| true, &mut counts);
+        let hit = self.closest::<false, _>(ray, None, |_| true, &mut counts);
         (hit, counts)
     }
 
@@ -171,7 +172,8 @@ impl Scene {
         &self.inner.instances
     }
 
-    pub(crate) fn closest<P: Probe>(
+    /// `STATIC` as in [`Inner::trace`].
+    pub(crate) fn closest<const STATIC: bool, P: Probe>(
         &self,
         ray: &Ray<f64>,
         source: Option<HitId>,
@@ -180,7 +182,7 @@ impl Scene {
     ) -> Option<Hit> {
         let mut closest = Closest { t_min: ray.t_min, t_max: ray.t_max, source: self.flat(source), accept, best: None };
         // It never breaks: the nearest hit is known at the end only.
-        let _ = self.inner.trace(ray, &mut closest, probe);
+        let _ = self.inner.trace::<STATIC, _, _>(ray, &mut closest, probe);
         closest.best.map(|hit| Hit { normal: self.world_normal(&hit), ..hit })
     }
 
@@ -215,19 +217,58 @@ impl Scene {
 
 impl Inner {
     /// Offers hits to the collector, by the tests of the scene's tier.
+    ///
+    /// Guards taken away one by one are for measurements: their kernels are compiled for this collector only where it is
+    /// `STATIC`, and else called through a pointer, so that not every filter of every caller is compiled a dozen times.
     #[inline]
-    fn trace<C: Collector, P: Probe>(&self, ray: &Ray<f64>, collector: &mut C, probe: &mut P) -> ControlFlow<()> {
+    fn trace<const STATIC: bool, C: Collector, P: Probe>(
+        &self,
+        ray: &Ray<f64>,
+        collector: &mut C,
+        probe: &mut P,
+    ) -> ControlFlow<()> {
         if !ray.is_valid() {
             return ControlFlow::Continue(());
         }
         match self.options.precision {
             Precision::Fast => self.trace_by::<Fast, C, P>(ray, collector, probe),
-            Precision::Robust => self.trace_by::<Robust, C, P>(ray, collector, probe),
+            Precision::Robust if self.options.guards.contains(Guards::ALL.difference(Guards::OFFSET)) => {
+                self.trace_by::<Robust<true, true, true, true>, C, P>(ray, collector, probe)
+            }
+            Precision::Robust if STATIC => self.trace_guarded(ray, collector, probe),
+            Precision::Robust => self.trace_guarded(ray, collector as &mut (dyn Collector + '_), probe),
             Precision::Double => self.trace_by::<Double, C, P>(ray, collector, probe),
         }
     }
 
-    fn trace_by<K: Kernel, C: Collector, P: Probe>(
+    /// The robust tier without some of its guards.
+    fn trace_guarded<C: Collector + ?Sized, P: Probe>(
+        &self,
+        ray: &Ray<f64>,
+        collector: &mut C,
+        probe: &mut P,
+    ) -> ControlFlow<()> {
+        macro_rules! by {
+            ($($guard:literal),*) => { self.trace_by::<Robust<$($guard),*>, C, P>(ray, collector, probe) };
+        }
+        let on = |guard| self.options.guards.contains(guard);
+        match (on(Guards::PADDING), on(Guards::WATERTIGHT), on(Guards::FALLBACK), on(Guards::PLANE_T)) {
+            (false, false, _, false) => by!(false, false, false, false),
+            (false, false, _, true) => by!(false, false, false, true),
+            (false, true, false, false) => by!(false, true, false, false),
+            (false, true, false, true) => by!(false, true, false, true),
+            (false, true, true, false) => by!(false, true, true, false),
+            (false, true, true, true) => by!(false, true, true, true),
+            (true, false, _, false) => by!(true, false, false, false),
+            (true, false, _, true) => by!(true, false, false, true),
+            (true, true, false, false) => by!(true, true, false, false),
+            (true, true, false, true) => by!(true, true, false, true),
+            (true, true, true, false) => by!(true, true, true, false),
+            (true, true, true, true) => by!(true, true, true, true),
+        }
+    }
+
+    fn trace_by<K: Kernel, C: Collector + ?Sized, P: Probe>(
         &self,
         ray: &Ray<f64>,
         collector: &mut C,
@@ -258,7 +299,14 @@ impl Inner {
         match self.tree.root() {
             // One instance, or a few: nothing to prepare.
             Some(root) if root.is_leaf() => leaf(root.range(), probe).map_continue(drop),
-            _ => traverse(&self.tree, &Slabs::new(ray.origin, ray.direction), before, t_max, probe, leaf),
+            _ => {
+                let slabs = Slabs::new(ray.origin, ray.direction);
+                if K::PADDED {
+                    traverse::<true, _, _, _>(&self.tree, &slabs, before, t_max, probe, leaf)
+                } else {
+                    traverse::<false, _, _, _>(&self.tree, &slabs, before, t_max, probe, leaf)
+                }
+            }
         }
     }
 

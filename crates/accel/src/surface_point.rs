@@ -4,7 +4,10 @@ use firsthit_geometry::{Precision, Ray, Real, transform::Transform, triangle};
 use glam::DVec3;
 
 use crate::model::Surface;
-use crate::{Hit, Scene, SurfacePoint};
+use crate::{BuildOptions, Guards, Hit, Scene, SurfacePoint};
+
+/// The textbook's epsilon, in units of the world: what takes the bound's place without [`Guards::OFFSET`].
+const CONSTANT_OFFSET: f64 = 1e-4;
 
 impl Scene {
     /// Where exactly a hit is, for starting other rays there. `ray` is the ray that found it.
@@ -31,6 +34,10 @@ impl Scene {
             }
         };
         let position = transform.point(point);
+        let BuildOptions { precision, guards, .. } = self.options();
+        if precision == Precision::Robust && !guards.contains(Guards::OFFSET) {
+            return SurfacePoint { position, normal: hit.normal, error: CONSTANT_OFFSET };
+        }
         SurfacePoint { position, normal: hit.normal, error: distance(transform, point, error, normal, position) }
     }
 }

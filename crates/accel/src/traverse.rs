@@ -14,7 +14,7 @@ use crate::stats::Probe;
 /// found), or breaks. Boxes that begin *beyond* that end are skipped; those that begin at it are visited, so that
 /// primitives at equal distance are all seen.
 #[inline(always)]
-pub(crate) fn traverse<R: Real, T: Tree<R>, P: Probe>(
+pub(crate) fn traverse<const PADDED: bool, R: Real, T: Tree<R>, P: Probe>(
     tree: &T,
     ray: &Slabs<R>,
     t_min: R,
@@ -29,7 +29,7 @@ pub(crate) fn traverse<R: Real, T: Tree<R>, P: Probe>(
             t_max = leaf(current.range(), probe)?;
         } else {
             probe.boxes(2);
-            let ([left, right], meets, enter) = tree.children(current.first, ray, t_min, t_max);
+            let ([left, right], meets, enter) = tree.children::<PADDED>(current.first, ray, t_min, t_max);
             let meets = if P::PRUNE { meets } else { [true; 2] };
             // Chosen by value: an index into the pair would send it through memory.
             match meets {

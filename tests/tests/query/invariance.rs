@@ -5,7 +5,7 @@ use firsthit_geometry::{Precision, Ray};
 use firsthit_tests::oracle::{Aim, Mesh, Rng, grid_cube, icosphere, read_obj};
 use glam::{DAffine3, DVec3, Vec3};
 
-use crate::{bits, scene_of, triangles};
+use crate::{bits, careful, scene_of, triangles};
 
 /// Rays at vertices, edges and faces, from around and inside.
 fn aimed(mesh: &Mesh, count: usize) -> Vec<Ray<f64>> {
@@ -32,7 +32,7 @@ fn same_in_any_order(scene: &Scene, rays: &[Ray<f64>], name: &str) {
 
 #[test]
 fn order_of_visits_and_boxes_change_nothing() {
-    for precision in Precision::ALL {
+    for precision in careful() {
         for (name, mesh) in [("icosphere", icosphere(4)), ("grid", grid_cube(12))] {
             let scene = scene_of(&mesh, DAffine3::IDENTITY, precision);
             same_in_any_order(&scene, &aimed(&mesh, 3000), name);
@@ -47,7 +47,7 @@ fn order_of_visits_and_boxes_change_nothing_on_scans() {
         [("spot/spot.obj", 3000), ("stanford-bunny/stanford-bunny.obj", 300), ("sibenik/sibenik.obj", 300)]
     {
         let mesh = read_obj(&shared.join("assets").join(name)).expect(name);
-        for precision in Precision::ALL {
+        for precision in careful() {
             same_in_any_order(&scene_of(&mesh, DAffine3::IDENTITY, precision), &aimed(&mesh, count), name);
         }
     }
@@ -57,7 +57,7 @@ fn order_of_visits_and_boxes_change_nothing_on_scans() {
 fn overlapping_instances_in_any_order() {
     // The same sphere many times at the same place and nearly so: ties between instances.
     let mesh = icosphere(2);
-    for precision in Precision::ALL {
+    for precision in careful() {
         let mut builder = SceneBuilder::new(BuildOptions { precision, ..BuildOptions::default() });
         let m = builder.add_mesh(vec![triangles(&mesh)]);
         for k in 0..30 {
@@ -77,7 +77,7 @@ fn overlapping_instances_in_any_order() {
 fn trees_of_any_quality_answer_alike() {
     let mesh = icosphere(4);
     let rays = aimed(&mesh, 10_000);
-    for precision in Precision::ALL {
+    for precision in careful() {
         let answers = [BuildQuality::Fast, BuildQuality::Balanced, BuildQuality::High].map(|quality| {
             let mut builder = SceneBuilder::new(BuildOptions { precision, quality, ..BuildOptions::default() });
             let m = builder.add_mesh(vec![triangles(&mesh)]);

@@ -1,6 +1,7 @@
 //! Queries of built scenes: no leaks, the same answers as slow twins, whatever the tree, order, scale or place.
 
 mod degenerate;
+mod guards;
 mod invariance;
 mod leaks;
 mod rays;
@@ -12,6 +13,11 @@ use firsthit_accel::{BuildOptions, Geometry, Hit, HitId, Scene, SceneBuilder};
 use firsthit_geometry::Precision;
 use firsthit_tests::oracle::Mesh;
 use glam::DAffine3;
+
+/// The tiers that promise answers which do not depend on the tree: all but the fast one, whose boxes are not padded.
+fn careful() -> impl Iterator<Item = Precision> {
+    Precision::ALL.into_iter().filter(|p| *p != Precision::Fast)
+}
 
 fn options(precision: Precision) -> BuildOptions {
     BuildOptions { precision, ..BuildOptions::default() }

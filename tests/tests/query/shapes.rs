@@ -108,7 +108,7 @@ fn an_infinite_plane_among_bounded_things() {
 
 #[test]
 fn order_of_visits_changes_nothing_with_shapes() {
-    for precision in Precision::ALL {
+    for precision in crate::careful() {
         let mut builder = SceneBuilder::new(options(precision));
         let mut rng = Rng(62);
         for _ in 0..6 {

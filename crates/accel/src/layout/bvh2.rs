@@ -84,7 +84,13 @@ impl<R: Real> Tree<R> for Bvh2<R> {
     }
 
     #[inline(always)]
-    fn children(&self, index: u32, ray: &Slabs<R>, t_min: R, t_max: R) -> ([Child; 2], [bool; 2], [R; 2]) {
+    fn children<const PADDED: bool>(
+        &self,
+        index: u32,
+        ray: &Slabs<R>,
+        t_min: R,
+        t_max: R,
+    ) -> ([Child; 2], [bool; 2], [R; 2]) {
         let node = &self.nodes[index as usize];
         // Where the ray enters both boxes, and minus where it leaves them.
         let mut ends = [t_min, t_min, -t_max, -t_max];
@@ -102,9 +108,13 @@ impl<R: Real> Tree<R> for Bvh2<R> {
                 ends[k] = if t > ends[k] { t } else { ends[k] };
             }
         }
-        let pad = R::TWO * R::gamma(4);
         let [enter0, enter1, leave0, leave1] = ends;
-        let meets = [enter0 <= leave0.abs() * pad - leave0, enter1 <= leave1.abs() * pad - leave1];
+        let meets = if PADDED {
+            let pad = R::TWO * R::gamma(4);
+            [enter0 <= leave0.abs() * pad - leave0, enter1 <= leave1.abs() * pad - leave1]
+        } else {
+            [enter0 <= -leave0, enter1 <= -leave1]
+        };
         (node.children, meets, [enter0, enter1])
     }
 }

@@ -17,5 +17,12 @@ pub(crate) trait Tree<R: Real> {
     fn root(&self) -> Option<Child>;
 
     /// The children of node `index`, whether the ray meets each within `[t_min, t_max]`, and where it enters them.
-    fn children(&self, index: u32, ray: &Slabs<R>, t_min: R, t_max: R) -> ([Child; 2], [bool; 2], [R; 2]);
+    /// `PADDED`: the far end is moved outward by the error of its roundings, so that no box is missed.
+    fn children<const PADDED: bool>(
+        &self,
+        index: u32,
+        ray: &Slabs<R>,
+        t_min: R,
+        t_max: R,
+    ) -> ([Child; 2], [bool; 2], [R; 2]);
 }

@@ -51,6 +51,21 @@ impl<R: Real> Shear<R> {
     #[inline(always)]
     #[must_use]
     pub fn weights(&self, vertices: [R::Vec3; 3]) -> Option<Weights<R>> {
+        self.decide::<true>(vertices)
+    }
+
+    /// The same by the rounded edge functions alone, without double precision where one is 0: what that guard is worth
+    /// can be measured against this.
+    ///
+    /// Where all three round to 0, a triangle that the line does meet is missed.
+    #[inline(always)]
+    #[must_use]
+    pub fn weights_unguarded(&self, vertices: [R::Vec3; 3]) -> Option<Weights<R>> {
+        self.decide::<false>(vertices)
+    }
+
+    #[inline(always)]
+    fn decide<const FALLBACK: bool>(&self, vertices: [R::Vec3; 3]) -> Option<Weights<R>> {
         // Written out: `map` on arrays is not always inlined, and cost a sixth of the time.
         let [a, b, c] = vertices;
         let ((ax, ay), (bx, by), (cx, cy)) = (self.apply(a), self.apply(b), self.apply(c));
@@ -64,10 +79,21 @@ impl<R: Real> Shear<R> {
         }
         let inverse = R::ONE / (e0 + e1 + e2);
         // A sum that is infinite or NaN (overflow), or too small for a reciprocal, is left to double precision too.
-        if e0 == R::ZERO || e1 == R::ZERO || e2 == R::ZERO || !(inverse.is_finite() && inverse != R::ZERO) {
+        let usable = inverse.is_finite() && inverse != R::ZERO;
+        if FALLBACK && (e0 == R::ZERO || e1 == R::ZERO || e2 == R::ZERO || !usable) {
             return exact([(ax, ay), (bx, by), (cx, cy)]);
         }
+        if !FALLBACK && !usable {
+            return None;
+        }
         Some(Weights { u: (e1 * inverse).min(R::ONE), v: (e2 * inverse).min(R::ONE) })
+    }
+
+    /// The axis that the ray follows most: 0, 1 or 2.
+    #[inline]
+    #[must_use]
+    pub fn axis(&self) -> usize {
+        self.axis
     }
 
     /// A point in the sheared plane: the ray is at (0, 0).
