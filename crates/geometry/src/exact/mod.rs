@@ -1,9 +1,10 @@
-//! Exact decisions about `f32` input: hit or miss, order along the ray, correctly rounded parameter.
+//! Exact decisions: hit or miss, order along the ray, parity, correctly rounded parameter.
 //!
-//! A decision is first tried in `f64` with a proven bound on its error; only where that cannot tell, integers of fixed
-//! size decide. Most rays never leave `f64`.
+//! A decision is first tried in `f64` with a proven bound on its error; only where that cannot tell, exact arithmetic
+//! decides. Most rays never leave `f64`. Input is taken as what its floats are, `f32` or `f64`.
 
-mod int;
+pub(crate) mod dyadic;
 mod triangle;
+mod twofold;
 
 pub use triangle::{ExactHit, ExactRay};

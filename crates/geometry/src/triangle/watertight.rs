@@ -98,7 +98,7 @@ impl<R: Real> Shear<R> {
 
     /// A point in the sheared plane: the ray is at (0, 0).
     #[inline(always)]
-    fn apply(&self, p: R::Vec3) -> (R, R) {
+    pub(crate) fn apply(&self, p: R::Vec3) -> (R, R) {
         let (x, y, z) = permuted::<R>(p, self.axis);
         (x - self.x * z, y - self.y * z)
     }
