@@ -29,6 +29,11 @@ pub(crate) trait Kernel {
     fn setup(ray: &LocalRay) -> Self::Setup;
     /// `t`, `u`, `v`; any `t`.
     fn test(setup: &Self::Setup, ray: &LocalRay, vertices: &[Vec3; 3]) -> Option<(f64, f32, f32)>;
+    /// The same if the triangle answers for the crossing, see [`crate::Crossings::Surfaces`].
+    #[inline(always)]
+    fn crosses(setup: &Self::Setup, ray: &LocalRay, vertices: &[Vec3; 3]) -> Option<(f64, f32, f32)> {
+        Self::test(setup, ray, vertices)
+    }
 }
 
 /// Tier `Fast`: Moeller-Trumbore in `f32`.
@@ -84,12 +89,32 @@ impl<const PADDING: bool, const WATERTIGHT: bool, const FALLBACK: bool, const PL
         };
         Some((t, w.u, w.v))
     }
+
+    #[inline(always)]
+    fn crosses(shear: &Shear<f32>, ray: &LocalRay, vertices: &[Vec3; 3]) -> Option<(f64, f32, f32)> {
+        if !WATERTIGHT {
+            return Self::test(shear, ray, vertices);
+        }
+        let w = shear.crosses(relative(vertices, ray.origin32))?;
+        Some((crossing(vertices, ray, f64::from(w.u), f64::from(w.v)), w.u, w.v))
+    }
 }
 
 /// Apart from the loop, since few triangles come so far.
 #[inline(never)]
 fn plane(vertices: &[Vec3; 3], ray: &LocalRay) -> Option<f64> {
     triangle::plane_parameter(double(vertices), ray.origin, ray.direction)
+}
+
+/// Where the ray crosses a triangle with these weights. No crossing may be lost, so where the plane does not tell (the
+/// ray lies in it, but for rounding) the depth of the vertices does.
+#[inline(never)]
+fn crossing(vertices: &[Vec3; 3], ray: &LocalRay, u: f64, v: f64) -> f64 {
+    plane(vertices, ray).unwrap_or_else(|| {
+        let [a, b, c] = double(vertices);
+        let point = a * (1.0 - u - v) + b * u + c * v;
+        (point - ray.origin).dot(ray.direction) / ray.direction.dot(ray.direction)
+    })
 }
 
 /// Tier `Double`: the same in `f64`, with the unrounded ray.
@@ -110,5 +135,12 @@ impl Kernel for Double {
         let [a, b, c] = double(vertices);
         let w = setup.weights([a - ray.origin, b - ray.origin, c - ray.origin])?;
         Some((plane(vertices, ray)?, w.u as f32, w.v as f32))
+    }
+
+    #[inline(always)]
+    fn crosses(setup: &Shear<f64>, ray: &LocalRay, vertices: &[Vec3; 3]) -> Option<(f64, f32, f32)> {
+        let [a, b, c] = double(vertices);
+        let w = setup.crosses([a - ray.origin, b - ray.origin, c - ray.origin])?;
+        Some((crossing(vertices, ray, w.u, w.v), w.u as f32, w.v as f32))
     }
 }

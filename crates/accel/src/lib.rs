@@ -49,6 +49,7 @@ pub use builder::{Geometry, SceneBuilder};
 pub use error::BuildError;
 pub use guards::Guards;
 pub use hit::{Hit, HitId, SurfacePoint, TraversalCounts};
+pub use query::{Crossings, HitLists};
 pub use scene::{Scene, SceneStats};
 #[doc(hidden)]
 pub use visit_order::VisitOrder;

@@ -103,9 +103,14 @@ impl Model {
                     for (k, t) in indices.iter().enumerate() {
                         let vertices = t.map(|i| normalised(positions[i as usize]));
                         if triangle::area_vector(vertices.map(|v| v.as_dvec3())) == DVec3::ZERO {
-                            // Never hit, so in no tree.
                             model.degenerate += 1;
-                            continue;
+                            // Never hit, so in no tree. But when seen with rounded vertices, one of three vertices in a
+                            // line lies beside the others: it closes the gap that its neighbours leave, so it is
+                            // counted when crossings of a surface are.
+                            let [a, b, c] = vertices;
+                            if a == b || b == c || c == a || options.precision == Precision::Fast {
+                                continue;
+                            }
                         }
                         triangles.push(vertices);
                         boxes.push(Aabb::from_points(vertices));
@@ -214,7 +219,7 @@ impl Model {
 
     /// Offers the hits of what is in the tree to the collector.
     #[inline(always)]
-    pub(crate) fn trace<K: Kernel, C: Collector + ?Sized, P: Probe>(
+    pub(crate) fn trace<const SURFACES: bool, K: Kernel, C: Collector + ?Sized, P: Probe>(
         &self,
         ray: &LocalRay,
         instance: u32,
@@ -224,15 +229,15 @@ impl Model {
     ) -> ControlFlow<()> {
         // Meshes of triangles alone, nearly all, pay nothing for shapes.
         if self.shapes.is_empty() {
-            self.trace_tree::<K, C, P, false>(ray, instance, precision, collector, probe)
+            self.trace_tree::<SURFACES, false, K, C, P>(ray, instance, precision, collector, probe)
         } else {
-            self.trace_tree::<K, C, P, true>(ray, instance, precision, collector, probe)
+            self.trace_tree::<SURFACES, true, K, C, P>(ray, instance, precision, collector, probe)
         }
     }
 
     /// A function of its own, so that its loop has the registers.
     #[inline(never)]
-    fn trace_tree<K: Kernel, C: Collector + ?Sized, P: Probe, const SHAPES: bool>(
+    fn trace_tree<const SURFACES: bool, const SHAPES: bool, K: Kernel, C: Collector + ?Sized, P: Probe>(
         &self,
         ray: &LocalRay,
         instance: u32,
@@ -250,7 +255,11 @@ impl Model {
                 probe.primitive();
                 if SHAPES && let Some(Places::Shape(index)) = self.places.get(self.ids[place].geometry as usize) {
                     taken |= self.offer_shape::<C>(*index, ray, instance, precision, K::CLAMPED, collector)?;
-                } else if let Some((t, u, v)) = K::test(&setup, ray, &self.triangles[place]) {
+                } else if let Some((t, u, v)) = if SURFACES {
+                    K::crosses(&setup, ray, &self.triangles[place])
+                } else {
+                    K::test(&setup, ray, &self.triangles[place])
+                } {
                     let t = if K::CLAMPED { within_triangle(ray, t, &self.triangles[place]) } else { Some(t) };
                     if let Some(t) = t {
                         let PrimitiveId { geometry, primitive } = self.ids[place];

@@ -3,15 +3,32 @@
 //! Obvious, and right wherever double precision can decide. Queries of any tier and layout are tested against it; it is
 //! public so that you can do so too.
 
-use firsthit_geometry::{Primitive, Ray, triangle};
+use firsthit_geometry::{
+    Primitive, Ray,
+    triangle::{self, Shear},
+};
 use glam::DVec3;
 
 use crate::model::Surface;
-use crate::{Hit, HitId, Scene};
+use crate::{Crossings, Hit, HitId, Scene};
 
-/// All hits in the ray's closed interval, by `t`, then by id. Of a shape that a ray meets more than once, all.
+/// All hits in the ray's closed interval, by `t`, then by id, those of the closed triangles
+/// ([`Crossings::Triangles`]). Of a shape that a ray meets more than once, all.
 #[must_use]
 pub fn all_hits(scene: &Scene, ray: &Ray<f64>) -> Vec<Hit> {
+    crossings(scene, ray, Crossings::Triangles)
+}
+
+/// How many hits there are.
+#[must_use]
+pub fn count_hits(scene: &Scene, ray: &Ray<f64>, what: Crossings) -> u32 {
+    crossings(scene, ray, what).len() as u32
+}
+
+/// All hits in the ray's closed interval, by `t`, then by id: with [`Crossings::Surfaces`], each crossing of a surface
+/// once, by the rule of [`Shear::crosses`] in `f64`.
+#[must_use]
+pub fn crossings(scene: &Scene, ray: &Ray<f64>, what: Crossings) -> Vec<Hit> {
     let mut hits = Vec::new();
     if !ray.is_valid() {
         return hits;
@@ -24,7 +41,9 @@ pub fn all_hits(scene: &Scene, ray: &Ray<f64>) -> Vec<Hit> {
             let id = HitId { instance: i as u32, geometry: id.geometry, primitive: id.primitive };
             match surface {
                 Surface::Triangle(v) => {
-                    if let Some(h) = triangle::watertight(v, &local) {
+                    let crossed = what == Crossings::Triangles
+                        || Shear::<f64>::new(local.direction).crosses(v.map(|p| p - local.origin)).is_some();
+                    if let Some(h) = triangle::watertight(v, &local).filter(|_| crossed) {
                         let normal = triangle::normal(v).map_or(DVec3::ZERO, |n| transform.normal(n));
                         hits.push(Hit { id, t: h.t, u: h.u as f32, v: h.v as f32, normal });
                     }

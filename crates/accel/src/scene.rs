@@ -16,7 +16,7 @@ use crate::model::{Model, PrimitiveId, Surface, limit};
 use crate::query::{Any, Closest, Collector};
 use crate::stats::{Off, Probe};
 use crate::traverse::traverse;
-use crate::{BuildError, BuildOptions, Geometry, Guards, Hit, HitId, TraversalCounts};
+use crate::{BuildError, BuildOptions, Crossings, Geometry, Guards, Hit, HitId, TraversalCounts};
 
 /// What a scene's trees are like.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -127,7 +127,7 @@ impl Scene {
     #[must_use]
     pub fn any_hit(&self, ray: &Ray<f64>) -> bool {
         let mut any = Any { t_min: ray.t_min, t_max: ray.t_max, source: None, accept: |_: &Hit| true };
-        self.inner.trace::<true, _, _>(ray, &mut any, &mut Off).is_break()
+        self.inner.trace::<true, false, _, _>(ray, &mut any, &mut Off).is_break()
     }
 
     /// As [`Scene::any_hit`] with a filter: see [`Scene::closest_hit_filtered`]. A filter that always says no is asked
@@ -135,7 +135,7 @@ impl Scene {
     #[must_use]
     pub fn any_hit_filtered(&self, ray: &Ray<f64>, source: Option<HitId>, accept: impl FnMut(&Hit) -> bool) -> bool {
         let mut any = Any { t_min: ray.t_min, t_max: ray.t_max, source: self.flat(source), accept };
-        self.inner.trace::<false, _, _>(ray, &mut any, &mut Off).is_break()
+        self.inner.trace::<false, false, _, _>(ray, &mut any, &mut Off).is_break()
     }
 
     /// As [`Scene::closest_hit`], with what it cost.
@@ -182,13 +182,27 @@ impl Scene {
     ) -> Option<Hit> {
         let mut closest = Closest { t_min: ray.t_min, t_max: ray.t_max, source: self.flat(source), accept, best: None };
         // It never breaks: the nearest hit is known at the end only.
-        let _ = self.inner.trace::<STATIC, _, _>(ray, &mut closest, probe);
+        let _ = self.inner.trace::<STATIC, false, _, _>(ray, &mut closest, probe);
         closest.best.map(|hit| Hit { normal: self.world_normal(&hit), ..hit })
+    }
+
+    /// Offers all hits to the collector.
+    pub(crate) fn cross<C: Collector, P: Probe>(
+        &self,
+        ray: &Ray<f64>,
+        crossings: Crossings,
+        collector: &mut C,
+        probe: &mut P,
+    ) -> ControlFlow<()> {
+        match crossings {
+            Crossings::Surfaces => self.inner.trace::<false, true, _, _>(ray, collector, probe),
+            Crossings::Triangles => self.inner.trace::<false, false, _, _>(ray, collector, probe),
+        }
     }
 
     /// The primitive to skip: only what a straight ray cannot meet twice.
     #[inline(always)]
-    fn flat(&self, source: Option<HitId>) -> Option<HitId> {
+    pub(crate) fn flat(&self, source: Option<HitId>) -> Option<HitId> {
         source.filter(|id| match self.surface(id) {
             Some((_, Surface::Triangle(_))) => true,
             Some((_, Surface::Shape(s))) => s.is_flat(),
@@ -203,7 +217,7 @@ impl Scene {
         Some((instance, surface))
     }
 
-    fn world_normal(&self, hit: &Hit) -> DVec3 {
+    pub(crate) fn world_normal(&self, hit: &Hit) -> DVec3 {
         match self.surface(&hit.id) {
             Some((instance, Surface::Triangle(v))) => {
                 // Not unit yet: the transform sees to it.
@@ -221,7 +235,7 @@ impl Inner {
     /// Guards taken away one by one are for measurements: their kernels are compiled for this collector only where it is
     /// `STATIC`, and else called through a pointer, so that not every filter of every caller is compiled a dozen times.
     #[inline]
-    fn trace<const STATIC: bool, C: Collector, P: Probe>(
+    fn trace<const STATIC: bool, const SURFACES: bool, C: Collector, P: Probe>(
         &self,
         ray: &Ray<f64>,
         collector: &mut C,
@@ -231,25 +245,27 @@ impl Inner {
             return ControlFlow::Continue(());
         }
         match self.options.precision {
-            Precision::Fast => self.trace_by::<Fast, C, P>(ray, collector, probe),
+            Precision::Fast => self.trace_by::<SURFACES, Fast, C, P>(ray, collector, probe),
             Precision::Robust if self.options.guards.contains(Guards::ALL.difference(Guards::OFFSET)) => {
-                self.trace_by::<Robust<true, true, true, true>, C, P>(ray, collector, probe)
+                self.trace_by::<SURFACES, Robust<true, true, true, true>, C, P>(ray, collector, probe)
             }
-            Precision::Robust if STATIC => self.trace_guarded(ray, collector, probe),
-            Precision::Robust => self.trace_guarded(ray, collector as &mut (dyn Collector + '_), probe),
-            Precision::Double => self.trace_by::<Double, C, P>(ray, collector, probe),
+            Precision::Robust if STATIC => self.trace_guarded::<SURFACES, C, P>(ray, collector, probe),
+            Precision::Robust => {
+                self.trace_guarded::<SURFACES, _, _>(ray, collector as &mut (dyn Collector + '_), probe)
+            }
+            Precision::Double => self.trace_by::<SURFACES, Double, C, P>(ray, collector, probe),
         }
     }
 
     /// The robust tier without some of its guards.
-    fn trace_guarded<C: Collector + ?Sized, P: Probe>(
+    fn trace_guarded<const SURFACES: bool, C: Collector + ?Sized, P: Probe>(
         &self,
         ray: &Ray<f64>,
         collector: &mut C,
         probe: &mut P,
     ) -> ControlFlow<()> {
         macro_rules! by {
-            ($($guard:literal),*) => { self.trace_by::<Robust<$($guard),*>, C, P>(ray, collector, probe) };
+            ($($guard:literal),*) => { self.trace_by::<SURFACES, Robust<$($guard),*>, C, P>(ray, collector, probe) };
         }
         let on = |guard| self.options.guards.contains(guard);
         match (on(Guards::PADDING), on(Guards::WATERTIGHT), on(Guards::FALLBACK), on(Guards::PLANE_T)) {
@@ -268,7 +284,7 @@ impl Inner {
         }
     }
 
-    fn trace_by<K: Kernel, C: Collector + ?Sized, P: Probe>(
+    fn trace_by<const SURFACES: bool, K: Kernel, C: Collector + ?Sized, P: Probe>(
         &self,
         ray: &Ray<f64>,
         collector: &mut C,
@@ -291,7 +307,7 @@ impl Inner {
                 let instance = &self.instances[i as usize];
                 let model = &self.models[instance.model as usize];
                 if let Some(local) = LocalRay::enter(ray, &instance.transform, model.extent()) {
-                    model.trace::<K, C, P>(&local, i, precision, collector, probe)?;
+                    model.trace::<SURFACES, K, C, P>(&local, i, precision, collector, probe)?;
                 }
             }
             ControlFlow::Continue(beyond(collector.t_max()))

@@ -53,5 +53,5 @@ pub use firsthit_import as import;
 pub use firsthit_render as render;
 pub use glam;
 
-pub use firsthit_accel::{BuildOptions, Geometry, Hit, HitId, Scene, SceneBuilder, SurfacePoint};
+pub use firsthit_accel::{BuildOptions, Crossings, Geometry, Hit, HitId, Scene, SceneBuilder, SurfacePoint};
 pub use firsthit_geometry::{Aabb, Precision, Ray, Shape};

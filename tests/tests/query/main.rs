@@ -1,5 +1,6 @@
 //! Queries of built scenes: no leaks, the same answers as slow twins, whatever the tree, order, scale or place.
 
+mod crossings;
 mod degenerate;
 mod guards;
 mod invariance;

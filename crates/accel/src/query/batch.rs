@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use crate::{Hit, Scene};
 
 /// Rays that one task takes.
-const CHUNK: usize = 1024;
+pub(super) const CHUNK: usize = 1024;
 
 impl Scene {
     /// [`Scene::closest_hit`] for each ray, into the slot of the same index. The shorter slice decides how many.

@@ -1,15 +1,20 @@
 //! Queries, one file each, over one way of collecting hits.
 
+mod all_hits;
 mod any_hit;
 mod batch;
 mod closest_hit;
+mod count_hits;
+mod crossings;
 
 use core::ops::ControlFlow;
 
 use glam::DVec3;
 
+pub use all_hits::HitLists;
 pub(crate) use any_hit::Any;
 pub(crate) use closest_hit::Closest;
+pub use crossings::Crossings;
 
 use crate::{Hit, HitId};
 
@@ -29,6 +34,7 @@ pub(crate) trait Collector {
     fn t_min(&self) -> f64;
     /// End of the interval from here on: hits beyond are not wanted any more.
     fn t_max(&self) -> f64;
-    /// Takes a hit or not; breaks when nothing more is wanted.
+    /// Takes a hit or not (then the interval may have become shorter, and of a shape no farther root is wanted); breaks
+    /// when nothing more is wanted.
     fn offer(&mut self, hit: Candidate) -> ControlFlow<(), bool>;
 }

@@ -6,6 +6,8 @@
 //! is monotone. Where one is 0 all three are computed again in double precision from the same sheared coordinates, and
 //! then the signs are exact. So the sheared mesh has no gaps, and neither has the test.
 
+use core::cmp::Ordering;
+
 use super::{TriangleHit, plane_parameter};
 use crate::{Ray, Real, Vector3, error::difference_of_products};
 
@@ -89,6 +91,48 @@ impl<R: Real> Shear<R> {
         Some(Weights { u: (e1 * inverse).min(R::ONE), v: (e2 * inverse).min(R::ONE) })
     }
 
+    /// Whether the line *crosses* the triangle: as [`Shear::weights`], but of the triangles that share the point where
+    /// it passes, one answers for all. A closed mesh is crossed an even number of times by every line.
+    ///
+    /// Where an edge function is 0, the ray passes through the edge (in the sheared plane). Then its sign is that for
+    /// the ray shifted by (eps, eps^2), with eps > 0 smaller than anything: with `e0 = cx*by - cy*bx`, a shift by (p, q)
+    /// adds `p (cy - by) + q (bx - cx)`, so the sign is that of `cy - by`, and if this is 0 too, that of `bx - cx`
+    /// (simulation of simplicity: Edelsbrunner and Muecke 1990). A neighbour sees the same numbers negated, hence the
+    /// other sign. The shifted ray passes through no edge and no vertex, so it crosses what is in its way, or not; an
+    /// edge that is seen as a point, or a triangle seen as a segment, is never crossed. Touching, as at a silhouette,
+    /// counts 0 or 2.
+    ///
+    /// ```
+    /// use firsthit_geometry::triangle::Shear;
+    /// use glam::DVec3;
+    ///
+    /// let [a, b, c, d] = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)].map(|(x, y)| DVec3::new(x, y, 5.0));
+    /// let down = Shear::new(DVec3::Z);
+    /// // Both halves of a square contain the point in the middle of their common edge; one is crossed there.
+    /// assert!(down.weights([a, b, c]).is_some() && down.weights([a, c, d]).is_some());
+    /// assert!(down.crosses([a, b, c]).is_some() != down.crosses([a, c, d]).is_some());
+    /// ```
+    #[inline(always)]
+    #[must_use]
+    pub fn crosses(&self, vertices: [R::Vec3; 3]) -> Option<Weights<R>> {
+        let [a, b, c] = vertices;
+        let ((ax, ay), (bx, by), (cx, cy)) = (self.apply(a), self.apply(b), self.apply(c));
+        let e0 = cx * by - cy * bx;
+        let e1 = ax * cy - ay * cx;
+        let e2 = bx * ay - by * ax;
+        let below = e0 < R::ZERO || e1 < R::ZERO || e2 < R::ZERO;
+        let above = e0 > R::ZERO || e1 > R::ZERO || e2 > R::ZERO;
+        if below && above {
+            return None;
+        }
+        let inverse = R::ONE / (e0 + e1 + e2);
+        let usable = inverse.is_finite() && inverse != R::ZERO;
+        if e0 == R::ZERO || e1 == R::ZERO || e2 == R::ZERO || !usable {
+            return exact_crossing([(ax, ay), (bx, by), (cx, cy)]);
+        }
+        Some(Weights { u: (e1 * inverse).min(R::ONE), v: (e2 * inverse).min(R::ONE) })
+    }
+
     /// The axis that the ray follows most: 0, 1 or 2.
     #[inline]
     #[must_use]
@@ -96,9 +140,10 @@ impl<R: Real> Shear<R> {
         self.axis
     }
 
-    /// A point in the sheared plane: the ray is at (0, 0).
+    /// A point, relative to the ray's origin, in the sheared plane: there the ray is at (0, 0).
     #[inline(always)]
-    pub(crate) fn apply(&self, p: R::Vec3) -> (R, R) {
+    #[must_use]
+    pub fn apply(&self, p: R::Vec3) -> (R, R) {
         let (x, y, z) = permuted::<R>(p, self.axis);
         (x - self.x * z, y - self.y * z)
     }
@@ -127,6 +172,28 @@ fn exact<R: Real>([(ax, ay), (bx, by), (cx, cy)]: [(R, R); 3]) -> Option<Weights
     let sum = e0 + e1 + e2;
     let (u, v) = (e1 / sum, e2 / sum);
     // A sum of 0 (no area in the sheared plane) makes both NaN.
+    (u >= 0.0 && v >= 0.0).then(|| Weights { u: R::from_f64(u), v: R::from_f64(v) })
+}
+
+/// The decision of [`Shear::crosses`] by edge functions of exact sign.
+#[cold]
+#[inline(never)]
+fn exact_crossing<R: Real>([a, b, c]: [(R, R); 3]) -> Option<Weights<R>> {
+    // The edge from `p` to `q`: its value, and its sign for the shifted ray, which is 0 only if `p` is `q`.
+    let edge = |p: (R, R), q: (R, R)| {
+        let e = difference_of_products(q.0, p.1, q.1, p.0);
+        let sign = |x: Ordering, y: Ordering| if x == Ordering::Equal { y } else { x };
+        let order = |x: R, y: R| x.partial_cmp(&y).unwrap_or(Ordering::Equal);
+        let side = if e > 0.0 { Ordering::Greater } else { Ordering::Less };
+        (e, if e == 0.0 { sign(order(q.1, p.1), order(p.0, q.0)) } else { side })
+    };
+    let ((e0, s0), (e1, s1), (e2, s2)) = (edge(b, c), edge(c, a), edge(a, b));
+    if s0 == Ordering::Equal || s0 != s1 || s1 != s2 {
+        return None;
+    }
+    let sum = e0 + e1 + e2;
+    let (u, v) = (e1 / sum, e2 / sum);
+    // NaN: an overflow.
     (u >= 0.0 && v >= 0.0).then(|| Weights { u: R::from_f64(u), v: R::from_f64(v) })
 }
 

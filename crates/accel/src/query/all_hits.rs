@@ -1,0 +1,176 @@
+//! Every hit.
+
+use core::cmp::Ordering;
+use core::ops::ControlFlow;
+
+use firsthit_geometry::Ray;
+use rayon::prelude::*;
+
+use super::{Candidate, Collector, Crossings, batch::CHUNK};
+use crate::stats::Off;
+use crate::{Hit, HitId, Scene};
+
+/// Keeps every accepted hit.
+struct All<'a, F> {
+    t_min: f64,
+    t_max: f64,
+    source: Option<HitId>,
+    accept: F,
+    hits: &'a mut Vec<Hit>,
+}
+
+impl<F: FnMut(&Hit) -> bool> Collector for All<'_, F> {
+    #[inline(always)]
+    fn t_min(&self) -> f64 {
+        self.t_min
+    }
+    #[inline(always)]
+    fn t_max(&self) -> f64 {
+        self.t_max
+    }
+    #[inline(always)]
+    fn offer(&mut self, hit: Candidate) -> ControlFlow<(), bool> {
+        let inside = self.t_min <= hit.t && hit.t <= self.t_max;
+        if inside && self.source != Some(hit.id) && (self.accept)(&hit) {
+            self.hits.push(hit);
+        }
+        // Never "taken": of a shape the next root is wanted too.
+        ControlFlow::Continue(false)
+    }
+}
+
+/// The hits of many rays, one list after the other.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct HitLists {
+    hits: Vec<Hit>,
+    /// End of each ray's hits.
+    ends: Vec<usize>,
+}
+
+impl HitLists {
+    /// The hits of ray `index`, as [`Scene::all_hits`] gives them; `None` if there was no such ray.
+    #[must_use]
+    pub fn get(&self, index: usize) -> Option<&[Hit]> {
+        let end = *self.ends.get(index)?;
+        let start = if index > 0 { self.ends[index - 1] } else { 0 };
+        self.hits.get(start..end)
+    }
+
+    /// The lists in the order of the rays.
+    pub fn iter(&self) -> impl Iterator<Item = &[Hit]> {
+        (0..self.len()).filter_map(|i| self.get(i))
+    }
+
+    /// All hits of all rays.
+    #[must_use]
+    pub fn hits(&self) -> &[Hit] {
+        &self.hits
+    }
+
+    /// Number of rays.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// Whether there was no ray.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.ends.is_empty()
+    }
+
+    fn push(&mut self, hits: &[Hit]) {
+        self.hits.extend_from_slice(hits);
+        self.ends.push(self.hits.len());
+    }
+
+    fn append(&mut self, other: &Self) {
+        let start = self.hits.len();
+        self.hits.extend_from_slice(&other.hits);
+        self.ends.extend(other.ends.iter().map(|e| e + start));
+    }
+}
+
+impl Scene {
+    /// Every hit in the ray's closed interval, sorted by `t`, then by id; none for an invalid ray. Of a shape, every
+    /// root.
+    ///
+    /// What counts where the ray passes through an edge is up to `crossings`. With [`Crossings::Triangles`] the first is
+    /// [`Scene::closest_hit`], and a ray that starts at a hit's `t` finds it and its equals again.
+    ///
+    /// ```
+    /// use firsthit_accel::{Crossings, Geometry, SceneBuilder};
+    /// use firsthit_geometry::Ray;
+    /// use glam::{DAffine3, DVec3, Vec3};
+    ///
+    /// let mut builder = SceneBuilder::default();
+    /// let square = builder.add_mesh(vec![Geometry::Triangles {
+    ///     positions: vec![Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y],
+    ///     triangles: vec![[0, 1, 2], [0, 2, 3]],
+    /// }]);
+    /// builder.add_instance(square, DAffine3::IDENTITY);
+    /// let scene = builder.build()?;
+    /// // Through the diagonal: two triangles have the point, one surface is crossed.
+    /// let ray = Ray::new(DVec3::new(0.5, 0.5, 1.0), DVec3::NEG_Z);
+    /// assert_eq!(scene.all_hits(&ray, Crossings::Triangles).len(), 2);
+    /// assert_eq!(scene.all_hits(&ray, Crossings::Surfaces).len(), 1);
+    /// # Ok::<(), firsthit_accel::BuildError>(())
+    /// ```
+    #[must_use]
+    pub fn all_hits(&self, ray: &Ray<f64>, crossings: Crossings) -> Vec<Hit> {
+        let mut hits = Vec::new();
+        self.all_hits_into(ray, crossings, &mut hits);
+        hits
+    }
+
+    /// As [`Scene::all_hits`], into a list that is emptied first and may be used again.
+    pub fn all_hits_into(&self, ray: &Ray<f64>, crossings: Crossings, hits: &mut Vec<Hit>) {
+        self.all_hits_filtered_into(ray, crossings, None, |_| true, hits);
+    }
+
+    /// As [`Scene::all_hits_into`], of the hits that `accept` accepts, other than on the flat primitive `source`.
+    /// `accept` is asked about each hit once, in any order, before its normal is filled in.
+    pub fn all_hits_filtered_into(
+        &self,
+        ray: &Ray<f64>,
+        crossings: Crossings,
+        source: Option<HitId>,
+        accept: impl FnMut(&Hit) -> bool,
+        hits: &mut Vec<Hit>,
+    ) {
+        hits.clear();
+        let mut all = All { t_min: ray.t_min, t_max: ray.t_max, source: self.flat(source), accept, hits };
+        // It never breaks.
+        let _ = self.cross(ray, crossings, &mut all, &mut Off);
+        let hits = all.hits;
+        hits.sort_by(by_place);
+        for hit in hits {
+            hit.normal = self.world_normal(hit);
+        }
+    }
+
+    /// [`Scene::all_hits`] for each ray.
+    #[must_use]
+    pub fn all_hits_each(&self, rays: &[Ray<f64>], crossings: Crossings) -> HitLists {
+        let mut lists = HitLists::default();
+        let mut hits = Vec::new();
+        for ray in rays {
+            self.all_hits_into(ray, crossings, &mut hits);
+            lists.push(&hits);
+        }
+        lists
+    }
+
+    /// As [`Scene::all_hits_each`], on the threads of the rayon pool it is called from. The same bits for any number.
+    #[must_use]
+    pub fn par_all_hits(&self, rays: &[Ray<f64>], crossings: Crossings) -> HitLists {
+        let chunks: Vec<HitLists> = rays.par_chunks(CHUNK).map(|r| self.all_hits_each(r, crossings)).collect();
+        let mut lists = HitLists::default();
+        chunks.iter().for_each(|c| lists.append(c));
+        lists
+    }
+}
+
+fn by_place(a: &Hit, b: &Hit) -> Ordering {
+    a.t.total_cmp(&b.t).then(a.id.cmp(&b.id))
+}

@@ -1,0 +1,78 @@
+//! How many hits there are.
+
+use core::ops::ControlFlow;
+
+use firsthit_geometry::Ray;
+use rayon::prelude::*;
+
+use super::{Candidate, Collector, Crossings, batch::CHUNK};
+use crate::stats::Off;
+use crate::{Hit, HitId, Scene};
+
+/// Counts the accepted hits.
+struct Count<F> {
+    t_min: f64,
+    t_max: f64,
+    source: Option<HitId>,
+    accept: F,
+    count: u32,
+}
+
+impl<F: FnMut(&Hit) -> bool> Collector for Count<F> {
+    #[inline(always)]
+    fn t_min(&self) -> f64 {
+        self.t_min
+    }
+    #[inline(always)]
+    fn t_max(&self) -> f64 {
+        self.t_max
+    }
+    #[inline(always)]
+    fn offer(&mut self, hit: Candidate) -> ControlFlow<(), bool> {
+        let inside = self.t_min <= hit.t && hit.t <= self.t_max;
+        self.count += u32::from(inside && self.source != Some(hit.id) && (self.accept)(&hit));
+        ControlFlow::Continue(false)
+    }
+}
+
+impl Scene {
+    /// How many hits the ray has in its closed interval: the length of [`Scene::all_hits`], without the list.
+    ///
+    /// With [`Crossings::Surfaces`] the count tells inside from outside: a ray without end that starts inside a closed
+    /// mesh counts an odd number, one from outside an even number, whichever way it goes, through edges and vertices
+    /// too (at the tiers but `Fast`).
+    #[must_use]
+    pub fn count_hits(&self, ray: &Ray<f64>, crossings: Crossings) -> u32 {
+        self.count_hits_filtered(ray, crossings, None, |_| true)
+    }
+
+    /// As [`Scene::count_hits`], of the hits that `accept` accepts, other than on the flat primitive `source`. `accept`
+    /// is asked about each hit once, in any order, before its normal is filled in.
+    #[must_use]
+    pub fn count_hits_filtered(
+        &self,
+        ray: &Ray<f64>,
+        crossings: Crossings,
+        source: Option<HitId>,
+        accept: impl FnMut(&Hit) -> bool,
+    ) -> u32 {
+        let mut count = Count { t_min: ray.t_min, t_max: ray.t_max, source: self.flat(source), accept, count: 0 };
+        // It never breaks.
+        let _ = self.cross(ray, crossings, &mut count, &mut Off);
+        count.count
+    }
+
+    /// [`Scene::count_hits`] for each ray, into the slot of the same index. The shorter slice decides how many.
+    pub fn count_hits_each(&self, rays: &[Ray<f64>], crossings: Crossings, counts: &mut [u32]) {
+        for (ray, count) in rays.iter().zip(counts) {
+            *count = self.count_hits(ray, crossings);
+        }
+    }
+
+    /// As [`Scene::count_hits_each`], on the threads of the rayon pool it is called from.
+    pub fn par_count_hits(&self, rays: &[Ray<f64>], crossings: Crossings, counts: &mut [u32]) {
+        rays.par_chunks(CHUNK)
+            .zip(counts.par_chunks_mut(CHUNK))
+            .for_each(|(r, c)| self.count_hits_each(r, crossings, c));
+    }
+}
