@@ -89,6 +89,11 @@ impl Chart {
         !self.points.iter().any(Point::is_shown)
     }
 
+    /// Whether its points differ in their errors.
+    pub(super) fn tells_apart(&self) -> bool {
+        self.points.windows(2).any(|p| (p[0].error, p[0].worst) != (p[1].error, p[1].worst))
+    }
+
     /// The chart as an `svg` element without style; `attributes` go into its tag.
     pub(super) fn draw(&self, attributes: &str) -> String {
         let mut out = format!(
@@ -149,8 +154,8 @@ impl Chart {
             .collect();
         draw_front(out, &placed);
         let labels = place_labels(&placed, plot_bottom, band);
-        // Tiers last, on top of the guards.
-        let order = |p: &Placed<'_>| matches!(p.point.mark, Mark::Tier(_));
+        // The small marks of guards last: they must not lie hidden under those of tiers.
+        let order = |p: &Placed<'_>| matches!(p.point.mark, Mark::Guard(_));
         let mut both: Vec<_> = placed.iter().zip(labels).collect();
         both.sort_by_key(|(p, _)| order(p));
         for (placed, label) in both {
@@ -225,7 +230,7 @@ fn band_rows(shown: &[&Point], x: &LogScale) -> Vec<Option<usize>> {
     for i in order {
         let at = x.place(shown[i].time[1]);
         let row = ends.iter().position(|end| *end <= at).unwrap_or(ends.len());
-        let end = at + APART + text_width(&shown[i].label);
+        let end = at + APART + label_width(shown[i]);
         if row == ends.len() {
             ends.push(end);
         } else {
@@ -236,8 +241,10 @@ fn band_rows(shown: &[&Point], x: &LogScale) -> Vec<Option<usize>> {
     rows
 }
 
-fn text_width(text: &str) -> f64 {
-    6.6 * text.chars().count() as f64
+/// About as wide as a label is in a wide font, and apart from the next.
+fn label_width(point: &Point) -> f64 {
+    let bold = matches!(point.mark, Mark::Tier(_));
+    3.0 + (if bold { 7.6 } else { 6.6 }) * point.label.chars().count() as f64
 }
 
 /// Places of the labels, in the order of the points.
@@ -253,7 +260,7 @@ fn place_labels(placed: &[Placed<'_>], plot_bottom: f64, band: f64) -> Vec<Rect>
     let tiers = |i: &usize| matches!(placed[*i].point.mark, Mark::Tier(_));
     let (first, then): (Vec<usize>, Vec<usize>) = (0..placed.len()).partition(tiers);
     for i in first.into_iter().chain(then) {
-        labels[i] = placer.place((placed[i].x, placed[i].y), text_width(&placed[i].point.label), 12.0);
+        labels[i] = placer.place((placed[i].x, placed[i].y), label_width(placed[i].point), 12.0);
     }
     labels
 }
@@ -282,7 +289,15 @@ fn draw_point(out: &mut String, placed: &Placed<'_>, label: &Rect, x: &LogScale,
         };
         let _ = write!(out, "<path class=\"fh-spread\" d=\"M{px:.1} {py:.1}V{top:.1}{cap}\"/>");
     }
-    let (lx, ly) = (label.x + 0.5 * label.width, label.y + 0.5 * label.height);
+    // Where guards crowd, each must still be pointed at.
+    let reach = if matches!(point.mark, Mark::Guard(_)) { 7 } else { 12 };
+    // At the side that faces the point, whatever the width of the reader's font.
+    let (lx, anchor) = match () {
+        () if label.x > px => (label.x, " fh-start"),
+        () if label.x + label.width < px => (label.x + label.width, " fh-end"),
+        () => (label.x + 0.5 * label.width, ""),
+    };
+    let ly = label.y + 0.5 * label.height;
     let ex = px.clamp(label.x, label.x + label.width);
     let ey = py.clamp(label.y, label.y + label.height);
     if (ex - px).hypot(ey - py) > 11.0 {
@@ -290,8 +305,8 @@ fn draw_point(out: &mut String, placed: &Placed<'_>, label: &Rect, x: &LogScale,
     }
     let _ = writeln!(
         out,
-        "<circle class=\"fh-target\" cx=\"{px:.1}\" cy=\"{py:.1}\" r=\"12\"/>{}\
-         <text class=\"fh-label\" x=\"{lx:.1}\" y=\"{:.1}\">{}</text></g>",
+        "<circle class=\"fh-target\" cx=\"{px:.1}\" cy=\"{py:.1}\" r=\"{reach}\"/>{}\
+         <text class=\"fh-label{anchor}\" x=\"{lx:.1}\" y=\"{:.1}\">{}</text></g>",
         mark(point.mark, px, py),
         ly + 4.0,
         escape(&point.label)

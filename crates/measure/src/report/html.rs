@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::{
     chart::{Mark, mark},
-    panel::{Panel, capital, picture_panel, shape_panels, tier_panels},
+    panel::{Panel, capital, picture_panel, rays_of, shape_panels},
     svg::STYLE as CHART_STYLE,
     table::{PICTURES, SHAPES, TIERS, table},
     text::{counted, escape, number},
@@ -76,22 +76,26 @@ fn header(out: &mut String, accuracy: &Accuracy) {
 }
 
 fn model_section(out: &mut String, accuracy: &Accuracy, model: &Model, number: usize) {
-    let panels = tier_panels(accuracy, model);
+    let measured = rays_of(accuracy, model);
     let pictures = picture_panel(accuracy, model);
-    if panels.is_empty() && pictures.is_none() {
+    if measured.is_empty() && pictures.is_none() {
         return;
     }
     let _ = writeln!(out, "<section id=\"model-{number}\"><h2>{}</h2>", escape(&model.name));
-    let tabs = panels.iter().map(|(panel, rows)| {
-        let caption = format!("{}: {} rays", model.name, panel.rays);
-        let numbers = table(&caption, TIERS, rows, |r| !r.guard.is_empty());
-        (format!("{} rays", capital(panel.rays)), charts(panel) + &numbers)
+    let tabs = measured.iter().map(|rays| {
+        let mut tab = charts(&rays.tiers);
+        if let Some(guards) = &rays.guards {
+            tab += "<h3>The robust tier, guard by guard</h3>\n";
+            tab += &charts(guards);
+        }
+        tab += &table(&rays.tiers.title, TIERS, &rays.rows, |r| !r.guard.is_empty());
+        (format!("{} rays", capital(rays.kind)), tab)
     });
     out.push_str(&tabbed(&format!("m{number}"), "Kind of rays", tabs));
     if let Some((panel, rows)) = pictures {
         let _ = writeln!(out, "<h3>Pictures</h3>");
         out.push_str(&charts(&panel));
-        out.push_str(&table(&format!("{}: pictures", model.name), PICTURES, &rows, |_| false));
+        out.push_str(&table(&panel.title, PICTURES, &rows, |_| false));
     }
     out.push_str("</section>\n");
 }
@@ -102,9 +106,9 @@ fn shapes_section(out: &mut String, accuracy: &Accuracy) {
         return;
     }
     out.push_str("<section id=\"shapes\"><h2>Analytic shapes</h2>\n");
-    let tabs = panels.iter().map(|(panel, rows)| {
-        let numbers = table(&format!("Shapes: {} rays", panel.rays), SHAPES, rows, |_| false);
-        (format!("{} rays", capital(panel.rays)), charts(panel) + &numbers)
+    let tabs = panels.iter().map(|(panel, kind, rows)| {
+        let numbers = table(&panel.title, SHAPES, rows, |_| false);
+        (format!("{} rays", capital(kind)), charts(panel) + &numbers)
     });
     out.push_str(&tabbed("shapes", "Kind of rays", tabs));
     out.push_str("</section>\n");

@@ -6,35 +6,49 @@ use super::{
 };
 use crate::result::{Accuracy, Model, PictureRow, ShapeRow, TierRow};
 
-/// A panel of charts that share their points: one model and one kind of rays, one kind of rays on all shapes, or one
-/// model's pictures.
+/// Charts that share their points: one model and one kind of rays, one kind of rays on all shapes, or one model's
+/// pictures.
 #[derive(Clone, Debug)]
 pub(super) struct Panel<'a> {
-    /// What the panel shows: the name of a model, `Shapes`.
+    /// What it shows: `dragon.obj: aimed rays`.
     pub(super) title: String,
-    /// The kind of rays; empty for pictures.
-    pub(super) rays: &'a str,
     /// Charts that have something to show.
     pub(super) charts: Vec<Chart>,
     /// What the letters of guards stand for.
     pub(super) guards: Vec<&'a str>,
 }
 
-/// The charts of one model and one kind of rays for each such pair, in the order measured, with the rows behind them.
-pub(super) fn tier_panels<'a>(accuracy: &'a Accuracy, model: &Model) -> Vec<(Panel<'a>, Vec<&'a TierRow>)> {
+/// What was measured with one kind of rays on one model.
+pub(super) struct Rays<'a> {
+    pub(super) kind: &'a str,
+    pub(super) tiers: Panel<'a>,
+    /// The guards of the robust tier between the tiers that have none and all: they lie too close together to be told
+    /// apart in the charts that reach as far as the exact tier.
+    pub(super) guards: Option<Panel<'a>>,
+    pub(super) rows: Vec<&'a TierRow>,
+}
+
+/// What was measured on a model, by the kind of rays.
+pub(super) fn rays_of<'a>(accuracy: &'a Accuracy, model: &Model) -> Vec<Rays<'a>> {
     let of_model: Vec<_> = accuracy.tiers.iter().filter(|r| r.model == model.name).collect();
     let guards = distinct(of_model.iter().map(|r| r.guard.as_str()).filter(|g| !g.is_empty()));
-    distinct(of_model.iter().map(|r| r.rays.as_str()))
-        .into_iter()
-        .map(|rays| {
-            let rows: Vec<_> = of_model.iter().copied().filter(|r| r.rays == rays).collect();
-            let charts = Metric::ALL.iter().map(|m| m.chart(model, rays, &rows, &guards));
-            let charts = charts.filter(|c| !c.is_empty()).collect();
-            let used = rows.iter().any(|r| !r.guard.is_empty());
-            let guards = if used { guards.clone() } else { Vec::new() };
-            (Panel { title: model.name.clone(), rays, charts, guards }, rows)
-        })
-        .collect()
+    let measured = |kind| {
+        let rows: Vec<_> = of_model.iter().copied().filter(|r| r.rays == kind).collect();
+        let panel = |what: &str, rows: &[&TierRow], guards: &[&'a str]| {
+            let title = format!("{}: {kind} rays{what}", model.name);
+            let charts = Metric::ALL.iter().map(|m| m.chart(&title, rows, guards)).collect();
+            Panel { title, charts, guards: guards.to_vec() }
+        };
+        let (whole, parts): (Vec<_>, Vec<_>) = rows.iter().partition(|r| r.guard.is_empty());
+        let mut tiers = panel("", &whole, &[]);
+        tiers.charts.retain(|c| !c.is_empty());
+        let ends = whole.iter().filter(|w| w.tier == "fast" || parts.iter().any(|p| p.tier == w.tier)).copied();
+        let mut by_guard = panel(", guard by guard", &ends.chain(parts.iter().copied()).collect::<Vec<_>>(), &guards);
+        by_guard.charts.retain(|c| !c.is_empty() && c.tells_apart());
+        let guards = Some(by_guard).filter(|g| !parts.is_empty() && !g.charts.is_empty());
+        Rays { kind, tiers, guards, rows }
+    };
+    distinct(of_model.iter().map(|r| r.rays.as_str())).into_iter().map(measured).collect()
 }
 
 /// What is drawn over time for tiers.
@@ -112,7 +126,7 @@ impl Metric {
         }
     }
 
-    fn chart(self, model: &Model, rays: &str, rows: &[&TierRow], guards: &[&str]) -> Chart {
+    fn chart(self, panel: &str, rows: &[&TierRow], guards: &[&str]) -> Chart {
         let (name, title, unit) = self.names();
         let mut points = Vec::new();
         let mut trials = Vec::new();
@@ -125,7 +139,7 @@ impl Metric {
                 time: [r.ns_low, r.ns_per_ray, r.ns_high],
                 error: error.error,
                 worst: error.worst,
-                tip: format!("{}, {rays} rays\n{}\n{}", full_name(r), time_words(r), error.words),
+                tip: format!("{}, {} rays\n{}\n{}", full_name(r), r.rays, time_words(r), error.words),
             });
         }
         let (fewest, most) = (trials.iter().min(), trials.iter().max());
@@ -134,10 +148,10 @@ impl Metric {
             None => "no error in 99 % of the rays".into(),
         };
         Chart {
-            slug: slug(&format!("{} {rays} {name}", model.name)),
+            slug: slug(&format!("{panel} {name}")),
             title: title.into(),
             subtitle: unit.into(),
-            time_axis: "ns per ray, less is better; ticks at the quartiles".into(),
+            time_axis: "ns per ray, less is better; lines join the quartiles".into(),
             band,
             floor: most.map(|n| 1e6 / *n as f64),
             points,
@@ -177,14 +191,14 @@ fn time_words(row: &TierRow) -> String {
 }
 
 /// The charts of analytic shapes: one panel for each kind of rays, hard ones first.
-pub(super) fn shape_panels(accuracy: &Accuracy) -> Vec<(Panel<'_>, Vec<&ShapeRow>)> {
+pub(super) fn shape_panels(accuracy: &Accuracy) -> Vec<(Panel<'_>, &str, Vec<&ShapeRow>)> {
     let mut kinds = distinct(accuracy.shapes.iter().map(|r| r.rays.as_str()));
     kinds.sort_by_key(|k| *k != "hard");
     let forms = distinct(accuracy.shapes.iter().map(|r| r.form.as_str()));
     let panel = |rays| {
         let rows: Vec<_> = accuracy.shapes.iter().filter(|r| r.rays == rays).collect();
         let charts = distinct(rows.iter().map(|r| r.shape.as_str())).into_iter().map(|shape| Chart {
-            slug: slug(&format!("shape {shape} {rays} t-error")),
+            slug: slug(&format!("shapes {rays} rays {shape} t-error")),
             title: capital(shape),
             subtitle: "error of t, f32 ulps: 99 %, line to the largest".into(),
             time_axis: "ns per test, less is better".into(),
@@ -193,7 +207,7 @@ pub(super) fn shape_panels(accuracy: &Accuracy) -> Vec<(Panel<'_>, Vec<&ShapeRow
             points: rows.iter().filter(|r| r.shape == shape).map(|r| shape_point(r, &forms)).collect(),
         });
         let charts = charts.filter(|c| !c.is_empty()).collect();
-        (Panel { title: "Shapes".into(), rays, charts, guards: Vec::new() }, rows)
+        (Panel { title: format!("Shapes: {rays} rays"), charts, guards: Vec::new() }, rays, rows)
     };
     kinds.into_iter().map(panel).collect()
 }
@@ -225,7 +239,7 @@ fn shape_point(row: &ShapeRow, forms: &[&str]) -> Point {
 pub(super) fn picture_panel<'a>(accuracy: &'a Accuracy, model: &Model) -> Option<(Panel<'a>, Vec<&'a PictureRow>)> {
     let rows: Vec<_> = accuracy.pictures.iter().filter(|r| r.model == model.name).collect();
     let chart = |name: &str, title: &str, subtitle: &str, error: fn(&PictureRow) -> f64| Chart {
-        slug: slug(&format!("{} picture {name}", model.name)),
+        slug: slug(&format!("{} pictures {name}", model.name)),
         title: title.into(),
         subtitle: subtitle.into(),
         time_axis: "seconds for the picture, less is better".into(),
@@ -256,7 +270,8 @@ pub(super) fn picture_panel<'a>(accuracy: &'a Accuracy, model: &Model) -> Option
         chart("flip", "Picture: FLIP", "mean visible difference, 0 to 1", |r| r.flip),
     ];
     let charts: Vec<_> = charts.into_iter().filter(|c| !c.is_empty()).collect();
-    (!charts.is_empty()).then(|| (Panel { title: model.name.clone(), rays: "", charts, guards: Vec::new() }, rows))
+    let title = format!("{}: pictures", model.name);
+    (!charts.is_empty()).then(|| (Panel { title, charts, guards: Vec::new() }, rows))
 }
 
 /// How many pixels differ, in words.

@@ -22,8 +22,8 @@ impl LogScale {
     /// An axis that holds these values with some room around; `None` where none of them is positive and finite.
     pub(super) fn around(values: impl IntoIterator<Item = f64>, range: (f64, f64)) -> Option<Self> {
         let (low, high) = extent(values)?;
-        // Half of 10 % at least, or a single time would have an axis of no length.
-        let room = ((high - low) * 0.1).max(0.05);
+        // 3 % at least, or a single time would have an axis of no length.
+        let room = ((high - low) * 0.08).max(0.013);
         Some(Self { domain: (low - room, high + room), range })
     }
 
@@ -98,7 +98,7 @@ mod tests {
         assert_eq!(labels(&wide, 8), ["10⁻³", "0.01", "0.1", "1", "10", "100", "1,000", "10⁴"]);
         assert_eq!((wide.place(1e-3), wide.place(1e4)), (0.0, 100.0));
         let narrow = LogScale::around([100.0, 180.0], (0.0, 100.0)).unwrap();
-        assert_eq!(labels(&narrow, 6), ["100", "120", "140", "160", "180", "200"]);
+        assert_eq!(labels(&narrow, 6), ["100", "120", "140", "160", "180"]);
         let middle = LogScale::around([100.0, 900.0], (0.0, 100.0)).unwrap();
         assert_eq!(labels(&middle, 6), ["100", "200", "500", "1,000"]);
     }

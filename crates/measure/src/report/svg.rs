@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::{
     chart::{Chart, HEIGHT, Mark, WIDTH, mark},
-    panel::{Panel, picture_panel, shape_panels, tier_panels},
+    panel::{Panel, picture_panel, rays_of, shape_panels},
     text::{counted, escape, number, slug},
 };
 use crate::result::{Accuracy, Model};
@@ -16,7 +16,8 @@ pub(super) const STYLE: &str = include_str!("chart.css");
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Charts {
-    /// Sheets: all metrics of a model and a kind of rays in one picture, with a key.
+    /// Sheets: all metrics of a model and a kind of rays in one picture; beside it a sheet of the robust tier's guards,
+    /// one of a model's pictures, one of shapes.
     #[default]
     Sheets,
     /// Every chart in a picture of its own.
@@ -37,18 +38,18 @@ pub enum Charts {
 /// let model = Model { name: "ball.obj".into(), closed: true, ..Model::default() };
 /// let accuracy = Accuracy { models: vec![model], tiers: vec![row], ..Accuracy::default() };
 /// let charts = report::svg(&accuracy, report::Charts::Each);
-/// assert_eq!(charts[0].0, "ball-obj-aimed-leaks");
+/// assert_eq!(charts[0].0, "ball-obj-aimed-rays-leaks");
 /// assert!(charts[0].1.contains("none seen in 100,000"));
 /// ```
 #[must_use]
 pub fn svg(accuracy: &Accuracy, charts: Charts) -> Vec<(String, String)> {
     let mut files = Vec::new();
     for model in &accuracy.models {
-        let tiers = tier_panels(accuracy, model).into_iter().map(|(panel, _)| panel);
+        let tiers = rays_of(accuracy, model).into_iter().flat_map(|rays| [Some(rays.tiers), rays.guards]).flatten();
         let pictures = picture_panel(accuracy, model).into_iter().map(|(panel, _)| panel);
         files.extend(tiers.chain(pictures).flat_map(|p| draw(accuracy, Some(model), &p, charts)));
     }
-    files.extend(shape_panels(accuracy).iter().flat_map(|(p, _)| draw(accuracy, None, p, charts)));
+    files.extend(shape_panels(accuracy).iter().flat_map(|(p, ..)| draw(accuracy, None, p, charts)));
     // Models of the same name in two folders shall not overwrite each other's charts.
     for i in 1..files.len() {
         let same = files[..i].iter().filter(|(name, _)| *name == files[i].0).count();
@@ -62,14 +63,9 @@ pub fn svg(accuracy: &Accuracy, charts: Charts) -> Vec<(String, String)> {
 fn draw(accuracy: &Accuracy, model: Option<&Model>, panel: &Panel<'_>, charts: Charts) -> Vec<(String, String)> {
     match charts {
         Charts::Sheets if panel.charts.is_empty() => Vec::new(),
-        Charts::Sheets => vec![(sheet_name(panel), sheet(accuracy, model, panel))],
+        Charts::Sheets => vec![(slug(&panel.title), sheet(accuracy, model, panel))],
         Charts::Each => panel.charts.iter().map(|c| (c.slug.clone(), alone(panel, c))).collect(),
     }
-}
-
-fn sheet_name(panel: &Panel<'_>) -> String {
-    let what = if panel.rays.is_empty() { "pictures" } else { panel.rays };
-    slug(&format!("{} {what}", panel.title))
 }
 
 /// One chart as a document, with its key below.
@@ -87,17 +83,13 @@ fn sheet(accuracy: &Accuracy, model: Option<&Model>, panel: &Panel<'_>) -> Strin
     let width = WIDTH * columns as f64;
     let mut below = HEAD + HEIGHT * rows as f64 + 10.0;
 
-    let title = match panel.rays {
-        "" => format!("{}: pictures", panel.title),
-        rays => format!("{}: {rays} rays", panel.title),
-    };
     let mut facts = vec![format!("firsthit {}", accuracy.version)];
     facts.extend(model.map(|m| counted(m.triangles, "triangle")));
     facts.extend(Some(accuracy.machine.cpu.clone()).filter(|cpu| !cpu.is_empty()));
     facts.push(format!("noise of timings {} %", number(100.0 * accuracy.machine.noise)));
     let mut body = format!(
         "<text class=\"fh-head\" x=\"24\" y=\"34\">{}</text><text class=\"fh-sub\" x=\"24\" y=\"54\">{}</text>\n",
-        escape(&title),
+        escape(&panel.title),
         escape(&facts.join(" · "))
     );
     for (i, chart) in panel.charts.iter().enumerate() {
@@ -106,7 +98,7 @@ fn sheet(accuracy: &Accuracy, model: Option<&Model>, panel: &Panel<'_>) -> Strin
     }
     body += &key(panel, width, below);
     below += key_height(panel, width);
-    document(width, below + 8.0, &title, &body)
+    document(width, below + 8.0, &panel.title, &body)
 }
 
 fn at(x: f64, y: f64) -> String {

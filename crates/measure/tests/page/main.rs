@@ -100,7 +100,7 @@ fn a_zero_stands_in_the_band_below_whatever_could_be_counted() {
         ..Accuracy::default()
     };
     let charts = report::svg(&accuracy, Charts::Each);
-    let svg = &charts.iter().find(|c| c.0 == "m-aimed-leaks").unwrap().1;
+    let svg = &charts.iter().find(|c| c.0 == "m-aimed-rays-leaks").unwrap().1;
     let heights: Vec<f64> = svg
         .split("class=\"fh-target\"")
         .skip(1)
