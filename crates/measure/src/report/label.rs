@@ -46,12 +46,12 @@ impl Placer {
             [(1.0, 0.0), (0.0, -1.0), (0.0, 1.0), (-1.0, 0.0), (0.7, -0.8), (0.7, 0.8), (-0.7, -0.8), (-0.7, 0.8)];
         let mut best: Option<(f64, Rect)> = None;
         for distance in [8.0, 14.0, 22.0, 32.0, 44.0] {
-            for (sx, sy) in SIDES {
+            for (order, (sx, sy)) in SIDES.into_iter().enumerate() {
                 let (cx, cy) = (x + sx * (distance + 0.5 * width), y + sy * (distance + 0.5 * height));
                 let rect = Rect { x: cx - 0.5 * width, y: cy - 0.5 * height, width, height };
                 let outside = rect.area() - rect.overlap(&self.frame);
                 let hidden: f64 = self.taken.iter().map(|t| t.overlap(&rect)).sum();
-                let cost = 10.0 * outside + hidden + 0.05 * distance;
+                let cost = 10.0 * outside + hidden + 0.05 * distance + 0.01 * order as f64;
                 if best.is_none_or(|(least, _)| cost < least) {
                     best = Some((cost, rect));
                 }
@@ -66,6 +66,16 @@ impl Placer {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_label_with_room_stands_to_the_right() {
+        let frame = Rect { x: 0.1, y: 0.1, width: 400.0, height: 300.0 };
+        for i in 1..100 {
+            let (x, y) = (3.37 * f64::from(i), 40.0 + 2.13 * f64::from(i));
+            let label = Placer::new(frame, vec![Rect::around(x, y, 6.0)]).place((x, y), 33.4, 12.0);
+            assert!(label.x > x, "{label:?}");
+        }
+    }
 
     #[test]
     fn labels_of_crowded_points_do_not_overlap() {
