@@ -1,4 +1,4 @@
-//! How far a render is: a bar on a terminal, a line now and then elsewhere.
+//! How far a render or a measurement is: a bar on a terminal, a line now and then elsewhere.
 
 use std::io::{self, IsTerminal};
 use std::sync::Mutex;
@@ -33,9 +33,11 @@ impl Style {
     }
 }
 
-/// Watches a render for the user.
+/// Watches a render or a measurement for the user.
 pub(crate) struct Progress {
     style: Style,
+    /// What is being done.
+    label: &'static str,
     started: Instant,
     last: Mutex<Instant>,
     bar: ProgressBar,
@@ -46,7 +48,7 @@ pub(crate) struct Progress {
 const REDRAW: Duration = Duration::from_millis(100);
 
 impl Progress {
-    pub(crate) fn new(style: Style, interrupt: Interrupt) -> Self {
+    pub(crate) fn new(style: Style, label: &'static str, interrupt: Interrupt) -> Self {
         let bar = match style {
             Style::Bar => ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::stderr()),
             _ => ProgressBar::hidden(),
@@ -55,10 +57,10 @@ impl Progress {
             bar.set_style(style);
         }
         let now = Instant::now();
-        Self { style, started: now, last: Mutex::new(now), bar, interrupt }
+        Self { style, label, started: now, last: Mutex::new(now), bar, interrupt }
     }
 
-    /// Takes the bar away: only the render's results stay.
+    /// Takes the bar away: only the results stay.
     pub(crate) fn finish(&self) {
         self.bar.finish_and_clear();
     }
@@ -84,7 +86,7 @@ impl Monitor for Progress {
             self.bar.set_message(text);
         } else {
             let percent = 100.0 * done as f64 / total.max(1) as f64;
-            message(format_args!("rendering: {percent:.0}%, {text}"));
+            message(format_args!("{}: {percent:.0}%, {text}", self.label));
         }
     }
 

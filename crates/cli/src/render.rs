@@ -43,7 +43,7 @@ pub(crate) fn run(args: &RenderArgs, config: Option<&Path>) -> Result<Exit, Fail
         pool = pool.num_threads(threads.into());
     }
     let pool = pool.build().map_err(|e| Failure::failed(format_args!("threads: {e}")))?;
-    let interrupt = Interrupt::listen(console);
+    let interrupt = Interrupt::listen(console, "writing the image so far");
     pool.install(|| Job { args, config, console, target, interrupt }.run())
 }
 
@@ -87,9 +87,9 @@ impl Job<'_> {
         }
 
         let started = Instant::now();
-        self.interrupt.begin_rendering();
+        self.interrupt.begin();
         let style = Style::new(args.run.progress, args.run.no_progress, args.run.quiet);
-        let progress = Progress::new(style, self.interrupt.clone());
+        let progress = Progress::new(style, "rendering", self.interrupt.clone());
         let rendered = firsthit_render::render(&stage, &options, &progress);
         progress.finish();
         let rendered = rendered.map_err(|e| self.at_model(&e))?;

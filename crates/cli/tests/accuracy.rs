@@ -88,3 +88,74 @@ fn a_folder_that_is_no_corpus_is_explained() {
     assert_eq!(accuracy(folder.path(), &[]).status.code(), Some(2));
     assert_eq!(accuracy(folder.path(), &["--corpus", ".", "--precision", "best"]).status.code(), Some(2));
 }
+
+/// A tetrahedron: closed, and quick.
+const MODEL: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+
+fn folder_with_model() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("tetra.obj"), MODEL).unwrap();
+    folder
+}
+
+#[test]
+fn a_model_is_measured_at_every_tier() {
+    let folder = folder_with_model();
+    let args = ["tetra.obj", "--quick", "--json", "--html", "page.html", "--svg", "charts.svg", "--seed", "7"];
+    let output = accuracy(folder.path(), &args);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let json = json(&output);
+    assert_eq!((&json["seed"], &json["effort"]), (&7.into(), &"quick".into()));
+    assert_eq!(json["models"][0]["closed"], true);
+    let rows = json["tiers"].as_array().unwrap();
+    let tiers = firsthit_geometry::Precision::ALL;
+    assert_eq!(rows.len(), tiers.len() * 4);
+    for row in rows {
+        assert_eq!(row["guard"], "");
+        assert!(row["ns_per_ray"].as_f64().unwrap() > 0.0 && row["ratio_to_fast"].as_f64().unwrap() > 0.0);
+        if row["tier"] != "fast" && row["rays"] == "aimed" {
+            assert_eq!((&row["leaks"], &row["aimed_rays"]), (&0.into(), &30_000.into()), "{row}");
+        }
+    }
+    let page = std::fs::read_to_string(folder.path().join("page.html")).unwrap();
+    assert!(page.starts_with("<!") && page.contains("tetra.obj") && page.contains("<svg"));
+    let charts: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
+    assert!(charts.iter().any(|n| n.to_string_lossy().starts_with("charts") && n.to_string_lossy().ends_with(".svg")));
+}
+
+#[test]
+fn a_measurement_is_printed_as_a_table_or_csv() {
+    let folder = folder_with_model();
+    let quick = ["tetra.obj", "--quick", "--rays", "aimed,shadow", "--precision", "fast,robust"];
+    let table = stdout(&accuracy(folder.path(), &quick));
+    for words in ["tetra.obj: 4 triangles, closed", "ns/ray", "x fast", "robust", "< 1.0e-4", "Use ", "sphere"] {
+        assert!(table.contains(words), "no '{words}' in {table}");
+    }
+    assert!(!table.contains("double") && !table.contains("primary"), "{table}");
+
+    let csv = stdout(&accuracy(folder.path(), &[&quick[..], &["--csv"]].concat()));
+    let lines: Vec<&str> = csv.lines().collect();
+    assert_eq!(lines.len(), 1 + 2 * 2, "{csv}");
+    assert!(lines[0].contains("ns_per_ray") && lines[0].contains("false_misses_by_level_exact"), "{csv}");
+    assert!(lines.iter().all(|l| l.matches(',').count() == lines[0].matches(',').count()), "{csv}");
+}
+
+#[test]
+fn what_cannot_be_measured_or_written_is_refused_in_time() {
+    let folder = folder_with_model();
+    std::fs::write(folder.path().join("none.obj"), "v 0 0 0\n").unwrap();
+    for (args, code, words) in [
+        (&["none.obj"][..], 1, "none.obj"),
+        (&["missing.obj"], 1, "missing.obj"),
+        (&["tetra.obj", "--html", "no/such/page.html"], 1, "no folder no/such"),
+        (&["tetra.obj", "--svg", "tetra.obj"], 1, "one of the models"),
+        (&["tetra.obj", "--rays", "x"], 2, "unknown rays 'x'"),
+        (&["tetra.obj", "--corpus", "."], 2, "cannot be used with"),
+        (&["tetra.obj", "--csv", "--json"], 2, "cannot be used with"),
+    ] {
+        let output = accuracy(folder.path(), args);
+        assert_eq!(output.status.code(), Some(code), "{args:?}");
+        assert!(stderr(&output).contains(words), "{args:?}: {}", stderr(&output));
+        assert!(output.stdout.is_empty());
+    }
+}

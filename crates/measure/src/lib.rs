@@ -1,15 +1,28 @@
 //! What accuracy costs in time, measured on the user's own model and machine; and the hard cases and scenarios that
 //! say what each tier must have right.
 //!
+//! * [`run()`] measures: each [`Subject`] at every tier, and with each guard of the robust tier, on the ray sets of
+//!   [`workload`], timed by [`timing`], compared with the most careful tier by [`metric`].
+//! * [`result`] is what a measurement comes to: plain data, which [`report`] turns into charts and a page.
 //! * [`corpus`] runs exact hard cases through every engine at every tier.
 //! * [`picture`] compares pictures.
 //! * [`mesh`] and [`random`] make input by rule.
-//! * [`result`] is what a measurement comes to: plain data, which [`report`] turns into charts and pages.
 #![forbid(unsafe_code)]
 
 pub mod corpus;
+pub mod decision;
 pub mod mesh;
+pub mod metric;
 pub mod picture;
 pub mod random;
 pub mod report;
 pub mod result;
+mod run;
+mod shapes;
+pub mod subject;
+pub mod timing;
+pub mod verdict;
+pub mod workload;
+
+pub use run::{Effort, MeasureError, Options, run};
+pub use subject::Subject;

@@ -120,3 +120,13 @@ pub fn grid_cube(n: u32) -> Mesh {
     }
     mesh
 }
+
+/// An [`icosphere`] with hills and valleys and one long bulge: closed, with triangles of many sizes and slopes.
+#[must_use]
+pub fn bumpy_sphere(levels: u32) -> Mesh {
+    icosphere(levels).map(|p| {
+        let hills = (9.0 * p.x).sin() * (7.0 * p.y).sin() * (8.0 * p.z).sin();
+        let bulge = (4.0 * (p.y - 1.0)).exp();
+        p * (1.0 + 0.15 * hills + 0.5 * bulge)
+    })
+}

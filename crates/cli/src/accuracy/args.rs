@@ -2,31 +2,92 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{ArgGroup, Args};
 use firsthit_geometry::Precision;
+use firsthit_import::UpAxis;
+use firsthit_measure::Effort;
+use firsthit_measure::workload::RayKind;
 
 const EXAMPLES: &str = "\
 Examples:
+  firsthit accuracy dragon.glb
+      Nanoseconds a ray and errors of every tier on this model and machine, and which tier to use.
+  firsthit accuracy dragon.glb sponza.obj --html accuracy.html --svg accuracy.svg
+      The same of two models, with a page and charts.
+  firsthit accuracy --builtin --quick --rays aimed --precision fast,robust
   firsthit accuracy --corpus tests/corpus
       Every engine at every tier on a folder of exact hard cases.
-  firsthit accuracy --corpus tests/corpus --json | jq '.corpus[] | select(.failed > 0)'
 
-Exit codes: 0 done, 1 failed (also: a required case was answered wrong), 2 wrong usage, 130 interrupted.";
+Exit codes: 0 done, 1 failed (also: a required case was answered wrong), 2 wrong usage, 130 interrupted (what was
+measured so far is printed).";
 
 #[derive(Args, Debug)]
 #[command(args_override_self = true, after_help = EXAMPLES)]
+#[command(group = ArgGroup::new("what").required(true).multiple(true).args(["models", "builtin", "corpus"]))]
 pub(crate) struct AccuracyArgs {
-    /// Run the hard cases of this folder (.jsonl files) on every engine
-    #[arg(long, value_name = "DIR", required = true)]
+    /// Models to measure: .obj, .obj.zst, .gltf, .glb, .toml, .json
+    #[arg(value_name = "MODEL")]
+    pub(crate) models: Vec<PathBuf>,
+
+    /// Measure the built-in model, a closed bumpy sphere
+    #[arg(long)]
+    pub(crate) builtin: bool,
+
+    /// Run the hard cases of this folder (.jsonl files) on every engine instead
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["models", "builtin", "csv", "html", "svg"])]
     pub(crate) corpus: Option<PathBuf>,
+
+    /// Seconds instead of a minute: fewer rays, and the robust tier's guards are not measured one by one
+    #[arg(long, overrides_with = "thorough")]
+    pub(crate) quick: bool,
+
+    /// Minutes instead of one: more rays and repetitions
+    #[arg(long, overrides_with = "quick")]
+    pub(crate) thorough: bool,
 
     /// Only these tiers of precision, comma-separated [default: all]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub(crate) precision: Vec<Precision>,
 
+    /// Only these kinds of rays, comma-separated: primary, shadow, incoherent, aimed [default: all]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    pub(crate) rays: Vec<RayKind>,
+
+    /// Seed of all rays
+    #[arg(long, value_name = "N", default_value = "1")]
+    pub(crate) seed: u64,
+
+    /// The models' upward axis: +X, -X, +Y, -Y, +Z or -Z [default: what the format says, else +Y]
+    #[arg(long, value_name = "AXIS", allow_hyphen_values = true)]
+    pub(crate) up: Option<UpAxis>,
+
     /// Print JSON
     #[arg(long)]
     pub(crate) json: bool,
+
+    /// Print comma-separated values, one line for each model, tier or guard, and kind of rays
+    #[arg(long, conflicts_with = "json")]
+    pub(crate) csv: bool,
+
+    /// Write a page with charts and tables, which needs no network
+    #[arg(long, value_name = "FILE")]
+    pub(crate) html: Option<PathBuf>,
+
+    /// Write the charts; of several the name is made from this one
+    #[arg(long, value_name = "FILE")]
+    pub(crate) svg: Option<PathBuf>,
+
+    /// Show progress, also where standard error is no terminal
+    #[arg(long, overrides_with = "no_progress")]
+    pub(crate) progress: bool,
+
+    /// Show no progress
+    #[arg(long, overrides_with = "progress")]
+    pub(crate) no_progress: bool,
+
+    /// Print results and errors only
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
 }
 
 impl AccuracyArgs {
@@ -34,5 +95,18 @@ impl AccuracyArgs {
     pub(crate) fn tiers(&self) -> Vec<Precision> {
         let wanted = |p: &Precision| self.precision.is_empty() || self.precision.contains(p);
         Precision::ALL.into_iter().filter(wanted).collect()
+    }
+
+    /// The kinds of rays asked for.
+    pub(crate) fn rays(&self) -> Vec<RayKind> {
+        RayKind::ALL.into_iter().filter(|k| self.rays.is_empty() || self.rays.contains(k)).collect()
+    }
+
+    pub(crate) fn effort(&self) -> Effort {
+        match (self.quick, self.thorough) {
+            (true, _) => Effort::Quick,
+            (_, true) => Effort::Thorough,
+            _ => Effort::Normal,
+        }
     }
 }

@@ -2,6 +2,9 @@
 
 mod args;
 mod corpus;
+mod csv;
+mod measure;
+mod table;
 
 pub(crate) use args::AccuracyArgs;
 
@@ -11,6 +14,6 @@ use crate::error::{Exit, Failure};
 pub(crate) fn run(args: &AccuracyArgs) -> Result<Exit, Failure> {
     match &args.corpus {
         Some(folder) => corpus::run(args, folder),
-        None => Ok(Exit::Done),
+        None => measure::run(args),
     }
 }
