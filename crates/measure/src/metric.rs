@@ -227,7 +227,7 @@ mod tests {
         let build = |options| SceneBuilder::from_desc(&subject.desc, options).build().unwrap();
         let best = Precision::ALL[Precision::ALL.len() - 1];
         let exact = build(BuildOptions { precision: best, ..BuildOptions::default() });
-        let set = ray_sets(&subject, &exact, &[kind], Size { picture: 32, aimed: 20_000 }, 1).remove(0);
+        let set = ray_sets(&subject, &exact, &exact, &[kind], Size { picture: 32, aimed: 20_000 }, 1).remove(0);
         let hits: Vec<_> = set.rays.iter().map(|r| exact.closest_hit(r)).collect();
         let truth = Truth { scene: &exact, hits: &hits };
         let errors = compare(&subject, &build(options), truth, &set, usize::MAX, &|| false);

@@ -197,7 +197,8 @@ impl Run<'_> {
         let build = |options| SceneBuilder::from_desc(&subject.desc, options).build();
         let of = |precision| build(BuildOptions { precision, ..BuildOptions::default() });
         let best = of(Precision::ALL[Precision::ALL.len() - 1])?;
-        let asked: Vec<Asked> = ray_sets(subject, &best, &self.options.rays, effort.size(), seed)
+        let fast = of(Precision::Fast)?;
+        let asked: Vec<Asked> = ray_sets(subject, &best, &fast, &self.options.rays, effort.size(), seed)
             .into_iter()
             .map(|set| {
                 let mut truth = vec![None; set.rays.len()];
@@ -214,7 +215,6 @@ impl Run<'_> {
 
         let variants = variants(self.options);
         let (tiers, guards): (Vec<_>, Vec<_>) = variants.into_iter().partition(|v| v.guard.is_empty());
-        let fast = of(Precision::Fast)?;
         // Half of the time for the tiers, the rest for the guards.
         let budget = effort.budget() / (2 * self.options.rays.len().max(1)) as u32;
 

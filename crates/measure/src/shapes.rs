@@ -35,6 +35,7 @@ impl Form {
 }
 
 /// What is intersected: a shape in both precisions, or a triangle.
+#[allow(clippy::large_enum_variant, reason = "there are eight")]
 enum Subject {
     Shape { name: &'static str, single: Shape<f32>, double: Shape<f64> },
     Triangle([Vec3; 3]),

@@ -77,10 +77,20 @@ pub struct Size {
     pub aimed: usize,
 }
 
-/// Makes the ray sets of a model. `scene` is the model built at the most careful tier: what is seen from where does not
-/// depend on what is measured.
+/// Makes the ray sets of a model.
+///
+/// `scene` is the model built at the most careful tier: what is seen from where does not depend on what is measured.
+/// `coarse` is the model at the least careful tier, which says how far off a surface rays start: no tier is given rays
+/// that begin within its own error. (How far each tier itself goes is measured apart, by bounces.)
 #[must_use]
-pub fn ray_sets(subject: &Subject, scene: &Scene, kinds: &[RayKind], size: Size, seed: u64) -> Vec<RaySet> {
+pub fn ray_sets(
+    subject: &Subject,
+    scene: &Scene,
+    coarse: &Scene,
+    kinds: &[RayKind],
+    size: Size,
+    seed: u64,
+) -> Vec<RaySet> {
     let mut rng = Rng(seed);
     let camera = frame(&subject.desc, scene, 1.0).camera;
     let film = camera.on_film(size.picture, size.picture);
@@ -94,7 +104,7 @@ pub fn ray_sets(subject: &Subject, scene: &Scene, kinds: &[RayKind], size: Size,
         .filter_map(|ray| {
             let hit = scene.closest_hit(ray)?;
             let facing = if hit.normal.dot(ray.direction) > 0.0 { -hit.normal } else { hit.normal };
-            (hit.normal != DVec3::ZERO).then(|| (scene.surface_point(ray, &hit), facing))
+            (hit.normal != DVec3::ZERO).then(|| (coarse.surface_point(ray, &hit), facing))
         })
         .collect();
 
@@ -207,12 +217,12 @@ mod tests {
         let subject = Subject::builtin();
         let scene = build(&subject);
         let size = Size { picture: 16, aimed: 300 };
-        let all = ray_sets(&subject, &scene, &RayKind::ALL, size, 7);
-        let one = ray_sets(&subject, &scene, &[RayKind::Aimed], size, 7);
+        let all = ray_sets(&subject, &scene, &scene, &RayKind::ALL, size, 7);
+        let one = ray_sets(&subject, &scene, &scene, &[RayKind::Aimed], size, 7);
         assert_eq!(all[3].rays, one[0].rays);
         assert!(all[3].inside && one[0].rays.len() == 300);
         assert_eq!(all[0].rays.len(), 256);
         assert!(all[1].rays.len() > 50 && all[1].rays.iter().all(|r| r.t_max == 1.0));
-        assert!(ray_sets(&subject, &scene, &[RayKind::Primary], size, 8)[0].rays != all[0].rays);
+        assert!(ray_sets(&subject, &scene, &scene, &[RayKind::Primary], size, 8)[0].rays != all[0].rays);
     }
 }
