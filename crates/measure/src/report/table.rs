@@ -38,7 +38,7 @@ impl Cell {
     fn rate(hits: u64, trials: u64) -> Self {
         let text = match (hits, trials) {
             (_, 0) => "–".into(),
-            (0, n) => format!("< 3/{}", count(n)),
+            (0, n) => format!("<\u{a0}3/{}", count(n)),
             (hits, _) => count(hits),
         };
         let value = if trials == 0 { f64::NAN } else { hits as f64 / trials as f64 };
