@@ -1,10 +1,12 @@
 //! The hard cases at every tier: exact expected answers, by each primitive's own test and through a scene; and rays
 //! that leave shapes.
 
+use std::ops::ControlFlow;
+
 use firsthit_accel::{BuildOptions, Geometry, SceneBuilder};
 use firsthit_geometry::exact::{ExactHit, ExactRay};
 use firsthit_geometry::shapes::{Cuboid, Quadric, Solid, Sphere};
-use firsthit_geometry::{Precision, Ray, Shape};
+use firsthit_geometry::{Precision, Primitive as _, Ray, Real, Shape, Vector3 as _};
 use firsthit_measure::corpus::{self, Case, Engine, Outcome, Primitive};
 use glam::{DAffine3, DQuat, DVec3, Vec3};
 use proptest::prelude::*;
@@ -68,6 +70,61 @@ fn exact_triangles_have_every_case_right() {
     }
     firsthit_tests::summary(&format!(
         "hard cases, exact triangle test: {ran} ran, {ran} passed, exact numbers were needed in {fallbacks}"
+    ));
+}
+
+/// The exact forms of the shapes have every case right, whatever its margin, in both arithmetics: hit or miss, and `t`
+/// to the last bit.
+#[test]
+fn exact_shapes_have_every_case_right() {
+    fn check<R: Real>(case: &Case, shape: &Shape<R>, ray: &Ray<R>, failures: &mut Vec<String>) -> bool {
+        let mut first = None;
+        let fallback = shape.visit_exact(ray, &mut |found| {
+            first = Some(found.hit);
+            ControlFlow::Break(())
+        });
+        let t = first.map(|hit| hit.t.to_f32());
+        // Inside a box no surface need be crossed, and of a polygon's boundary both answers are right.
+        let expected = case.expect.t_f32.map(|t| t.0).filter(|_| case.expect.result != Outcome::Miss);
+        let either = case.expect.result == Outcome::Either && t.is_none();
+        if t != expected && !either {
+            failures.push(format!("{}: {t:?}, not {expected:?}", case.id));
+        }
+        if let (Some(first), Some(n)) = (first, &case.expect.n) {
+            let exact = DVec3::from_array(n.each_ref().map(|x| x.parse().unwrap_or(f64::NAN)));
+            let off = first.normal.map_or(f64::INFINITY, |n| n.to_f64().distance(exact));
+            if R::MAX.to_f64() == f64::MAX && !(off <= 1e-7) {
+                failures.push(format!("{}: normal off by {off:e}", case.id));
+            }
+        }
+        if let Shape::Cuboid(cuboid) = shape
+            && cuboid.overlap_exact(ray).is_some() != (case.expect.result == Outcome::Hit)
+        {
+            failures.push(format!("{}: in the box or not", case.id));
+        }
+        fallback
+    }
+    let (mut ran, mut fallbacks, mut failures) = (0, 0, Vec::new());
+    for case in cases() {
+        if matches!(case.prim, Primitive::Triangle { .. } | Primitive::Mesh { .. }) {
+            continue;
+        }
+        let refused = case.expect.result == Outcome::NoHitOrError || case.category == "inverted-empty";
+        match (corpus::shape::<f64>(&case.prim), corpus::shape::<f32>(&case.prim)) {
+            (Ok(Some(double)), Ok(Some(single))) => {
+                check(&case, &single, &case.ray, &mut failures);
+                fallbacks += usize::from(check(&case, &double, &case.ray.to_f64(), &mut failures));
+            }
+            (double, single) if !refused && case.expect.result != Outcome::Miss => {
+                failures.push(format!("{}: refused, {double:?}, {single:?}", case.id));
+            }
+            _ => {}
+        }
+        ran += 1;
+    }
+    assert!(failures.is_empty(), "{} answers are wrong:\n{}", failures.len(), failures.join("\n"));
+    firsthit_tests::summary(&format!(
+        "hard cases, exact shapes: {ran} ran, {ran} passed, exact numbers were needed in {fallbacks}"
     ));
 }
 

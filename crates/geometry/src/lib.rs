@@ -34,4 +34,4 @@ pub use aabb::Aabb;
 pub use precision::Precision;
 pub use ray::Ray;
 pub use real::{Real, Vector3};
-pub use shapes::{Primitive, Shape, ShapeError, SurfaceHit};
+pub use shapes::{ExactSurfaceHit, Primitive, Shape, ShapeError, SurfaceHit};

@@ -46,11 +46,6 @@ impl Dyadic {
         self
     }
 
-    /// The square.
-    pub(crate) fn squared(&self) -> Self {
-        self * self
-    }
-
     /// `(m, e)` with the number about `m * 2^e`, to a relative 2^-52, and `0.5 <= |m| <= 1`; `(0, 0)` for zero.
     pub(crate) fn approximate(&self) -> (f64, i32) {
         let n = self.limbs.len();

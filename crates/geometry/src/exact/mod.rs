@@ -4,6 +4,8 @@
 //! decides. Most rays never leave `f64`. Input is taken as what its floats are, `f32` or `f64`.
 
 pub(crate) mod dyadic;
+pub(crate) mod number;
+pub(crate) mod quadratic;
 mod triangle;
 mod twofold;
 

@@ -8,7 +8,7 @@ use core::ops::{Add, Mul, Sub};
 /// The unevaluated sum `high + low`, `|low| <= ulp(high) / 2`. Operations are good to a relative 2^-100 of the sum of
 /// the absolute values of their operands, as long as nothing overflows or underflows.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Twofold {
+pub(crate) struct Twofold {
     pub(super) high: f64,
     pub(super) low: f64,
 }
@@ -64,7 +64,7 @@ impl Mul for Twofold {
 
 /// `a + b = s + e` exactly (Knuth).
 #[inline(always)]
-fn two_sum(a: f64, b: f64) -> (f64, f64) {
+pub(super) fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let s = a + b;
     let t = s - a;
     (s, (a - (s - t)) + (b - t))
@@ -92,7 +92,7 @@ fn two_product(a: f64, b: f64) -> (f64, f64) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::dyadic::Dyadic;
+    use super::super::{dyadic::Dyadic, number::Number as _};
     use super::*;
     use proptest::prelude::*;
 

@@ -1,7 +1,12 @@
 //! Axis-aligned boxes as primitives.
 
+use core::cmp::Ordering;
+use core::ops::ControlFlow;
+
 use super::common::{cast, padded};
-use super::{Primitive, ShapeError, SurfaceHit};
+use super::exact::visit_at;
+use super::{ExactSurfaceHit, ExactVisitor, Primitive, ShapeError, SurfaceHit};
+use crate::exact::quadratic::{Fraction, Quadratic, Side};
 use crate::{Aabb, Ray, Real, Vector3};
 
 /// The surface of an axis-aligned box. It may be flat (zero extent along an axis) or infinite.
@@ -44,6 +49,63 @@ pub(super) fn stay<R: Real>(bounds: &Aabb<R>, origin: R::Vec3, direction: R::Vec
         }
     }
     (s.enter <= later(s.exit)).then_some(s)
+}
+
+/// An end of the exact stay of a ray in a box.
+#[derive(Clone, Copy)]
+pub(super) struct ExactEnd {
+    pub(super) at: Fraction,
+    pub(super) axis: usize,
+    pub(super) entry: bool,
+}
+
+impl ExactEnd {
+    /// Its parameter, correctly rounded.
+    pub(super) fn nearest<R: Real>(&self, fallback: &mut bool) -> R {
+        let equation = Quadratic::new(self.at);
+        let t = equation.nearest(Side::Lower);
+        *fallback |= equation.fallback();
+        t
+    }
+}
+
+/// Where a ray's line is inside a closed box, exactly: entry and exit, each `None` where the box has no end.
+#[derive(Clone, Copy)]
+pub(super) struct ExactStay {
+    pub(super) enter: Option<ExactEnd>,
+    pub(super) exit: Option<ExactEnd>,
+}
+
+/// [`stay`], exactly.
+pub(super) fn exact_stay(bounds: &Aabb<f64>, ray: &Ray<f64>, fallback: &mut bool) -> Option<ExactStay> {
+    let mut s = ExactStay { enter: None, exit: None };
+    for axis in 0..3 {
+        let (o, d) = (ray.origin[axis], ray.direction[axis]);
+        let (lo, hi) = (bounds.min[axis], bounds.max[axis]);
+        // The latter two hold for boxes that lie wholly at infinity.
+        let beside = d == 0.0 && !(lo <= o && o <= hi);
+        if beside || lo == f64::INFINITY || hi == f64::NEG_INFINITY {
+            return None;
+        }
+        if d == 0.0 {
+            continue;
+        }
+        let (near, far) = if d < 0.0 { (hi, lo) } else { (lo, hi) };
+        let end = |plane: f64, entry: bool| ExactEnd { at: Fraction::new(plane, o, d), axis, entry };
+        let mut replace = |place: &mut Option<ExactEnd>, new: ExactEnd, wanted: Ordering| {
+            if place.is_none_or(|old| new.at.order(old.at, fallback) == wanted) {
+                *place = Some(new);
+            }
+        };
+        if near.is_finite() {
+            replace(&mut s.enter, end(near, true), Ordering::Greater);
+        }
+        if far.is_finite() {
+            replace(&mut s.exit, end(far, false), Ordering::Less);
+        }
+    }
+    let inverted = matches!(s, ExactStay { enter: Some(a), exit: Some(b) } if a.at.order(b.at, fallback).is_gt());
+    (!inverted).then_some(s)
 }
 
 /// `t` moved up by more than the rounding of two computed parameters can hide.
@@ -90,6 +152,20 @@ impl<R: Real> Cuboid<R> {
     pub fn overlap(&self, ray: &Ray<R>) -> Option<[R; 2]> {
         let s = self.admitted(ray)?;
         Some([s.enter.max(ray.t_min).min(ray.t_max), s.exit.min(ray.t_max).max(ray.t_min)])
+    }
+
+    /// [`Self::overlap`], exactly: whether there is one is certain, and the ends are correctly rounded.
+    #[must_use]
+    pub fn overlap_exact(&self, ray: &Ray<R>) -> Option<[R; 2]> {
+        let (line, mut fallback) = (ray.to_f64(), false);
+        let s = ray.is_valid().then(|| exact_stay(&self.bounds.to_f64(), &line, &mut fallback))??;
+        let too_late = s.enter.is_some_and(|e| !e.at.is_to(line.t_max, &mut fallback));
+        let too_early = s.exit.is_some_and(|e| !e.at.is_from(line.t_min, &mut fallback));
+        if too_late || too_early {
+            return None;
+        }
+        let mut rounded = |end: Option<ExactEnd>, without: R| end.map_or(without, |e| e.nearest(&mut fallback));
+        Some([rounded(s.enter, -R::INFINITY).max(ray.t_min), rounded(s.exit, R::INFINITY).min(ray.t_max)])
     }
 
     /// The stay in the box if it meets the ray's interval.
@@ -163,6 +239,29 @@ impl<R: Real> Primitive<R> for Cuboid<R> {
     fn closest_hit(&self, ray: &Ray<R>) -> Option<SurfaceHit<R>> {
         let (t, axis, entry) = self.nearest(ray)?;
         Some(Self::face_hit(&self.bounds, ray, t, axis, entry))
+    }
+
+    fn visit_exact(&self, ray: &Ray<R>, visit: &mut ExactVisitor<'_, R>) -> bool {
+        if !ray.is_valid() {
+            return false;
+        }
+        let (line, mut fallback) = (ray.to_f64(), false);
+        let Some(ExactStay { enter, exit }) = exact_stay(&self.bounds.to_f64(), &line, &mut fallback) else {
+            return fallback;
+        };
+        // An edge or corner that is touched has entry and exit in one.
+        let touched =
+            enter.zip(exit).is_some_and(|(a, b): (ExactEnd, ExactEnd)| a.at.order(b.at, &mut fallback).is_eq());
+        for end in [enter, exit.filter(|_| !touched)].into_iter().flatten() {
+            if end.at.is_in(&line, &mut fallback) {
+                let hit = |t| Self::face_hit(&self.bounds, ray, t, end.axis, end.entry);
+                let found = |t| ExactSurfaceHit { hit: hit(t), crosses: !touched };
+                if visit_at(end.nearest(&mut fallback), found, visit) == ControlFlow::Break(()) {
+                    break;
+                }
+            }
+        }
+        fallback
     }
 
     fn any_hit(&self, ray: &Ray<R>) -> bool {

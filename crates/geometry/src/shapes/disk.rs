@@ -1,7 +1,10 @@
 //! Disks and annuli.
 
 use super::common::{cast, finite_number, padded, positive, tangents, turn};
-use super::{Plane, Primitive, ShapeError, SurfaceHit};
+use super::exact::{Coordinate, OnPlane, visit_roots};
+use super::{ExactVisitor, Plane, Primitive, ShapeError, SurfaceHit};
+use crate::exact::number::Number;
+use crate::exact::quadratic::Formula;
 use crate::{Aabb, Ray, Real, Vector3};
 
 /// The points of a plane whose distance from `center` is between `inner_radius` and `radius`, both included.
@@ -68,17 +71,48 @@ impl<R: Real> Disk<R> {
         Ok(Disk { plane, ..disk })
     }
 
+    /// The hit at a point given relative to the centre.
+    fn hit(&self, t: R, l: R::Vec3) -> SurfaceHit<R> {
+        let (tangent, bitangent) = tangents::<R>(self.plane.normal());
+        let width = self.radius - self.inner_radius;
+        let v = if width > R::ZERO { (l.length() - self.inner_radius) / width } else { R::ZERO };
+        let v = v.max(R::ZERO).min(R::ONE);
+        SurfaceHit::new(t, turn(l.dot(tangent), l.dot(bitangent)), v, Some(self.plane.normal()))
+    }
+
+    /// A point of the ray relative to the centre, moved into the plane.
+    fn in_plane(&self, ray: &Ray<R>, t: R) -> R::Vec3 {
+        let n = self.plane.normal();
+        let l = (ray.origin - self.plane.point()) + ray.direction * t;
+        l - n * n.dot(l)
+    }
+
     /// `t` and the hit relative to the centre, moved into the plane exactly.
     fn nearest(&self, ray: &Ray<R>) -> Option<(R, R::Vec3)> {
         let t = self.plane.nearest(ray)?;
-        let n = self.plane.normal();
-        let l = (ray.origin - self.plane.point()) + ray.direction * t;
-        let l = l - n * n.dot(l);
+        let l = self.in_plane(ray, t);
         // In units of the radius, so that the squares stay in range.
         let scale = R::ONE / self.radius.power_of_two_below();
         let (s, outer, inner) = (l * scale, self.radius * scale, self.inner_radius * scale);
         let s = s.dot(s);
         (inner * inner <= s && s <= outer * outer).then_some((t, l))
+    }
+}
+
+/// `|p - c|^2 - r^2` at the hit point, times a positive number.
+struct Beyond<'a> {
+    plane: &'a OnPlane,
+    radius: f64,
+}
+
+impl Formula for Beyond<'_> {
+    fn value<N: Number>(&self, equation: &[N; 3]) -> N {
+        let OnPlane { origin, direction, point, .. } = *self.plane;
+        let square = |i: usize| {
+            Coordinate { origin: origin[i], direction: direction[i], from: point[i] }.value(equation).squared()
+        };
+        let radius = N::new(self.radius).times(&equation[1].twice());
+        square(0).plus(&square(1)).plus(&square(2)).minus(&radius.squared())
     }
 }
 
@@ -93,12 +127,14 @@ impl<R: Real> Primitive<R> for Disk<R> {
     }
 
     fn closest_hit(&self, ray: &Ray<R>) -> Option<SurfaceHit<R>> {
-        let (t, l) = self.nearest(ray)?;
-        let (tangent, bitangent) = tangents::<R>(self.plane.normal());
-        let width = self.radius - self.inner_radius;
-        let v = if width > R::ZERO { (l.length() - self.inner_radius) / width } else { R::ZERO };
-        let v = v.max(R::ZERO).min(R::ONE);
-        Some(SurfaceHit::new(t, turn(l.dot(tangent), l.dot(bitangent)), v, Some(self.plane.normal())))
+        self.nearest(ray).map(|(t, l)| self.hit(t, l))
+    }
+
+    fn visit_exact(&self, ray: &Ray<R>, visit: &mut ExactVisitor<'_, R>) -> bool {
+        let Some(equation) = self.plane.equation(ray) else { return false };
+        let beyond = |radius: R| equation.sign(&Beyond { plane: equation.equation(), radius: radius.to_f64() });
+        let admitted = |_| beyond(self.radius) <= 0 && (self.inner_radius == R::ZERO || beyond(self.inner_radius) >= 0);
+        visit_roots(&equation, ray, admitted, |t| self.hit(t, self.in_plane(ray, t)), visit)
     }
 
     fn any_hit(&self, ray: &Ray<R>) -> bool {

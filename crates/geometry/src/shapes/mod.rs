@@ -12,6 +12,8 @@
 //!
 //! To add one: a file here, a variant of [`Shape`], its cases in `tests/corpus`; the property suite picks it up.
 
+use core::ops::ControlFlow;
+
 use crate::{Aabb, Ray, Real};
 
 /// Where a ray meets a surface.
@@ -35,6 +37,19 @@ impl<R: Real> SurfaceHit<R> {
     }
 }
 
+/// Where a ray meets a surface, decided exactly.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ExactSurfaceHit<R: Real> {
+    /// The hit. Its `t` is correctly rounded; the rest comes from that `t`.
+    pub hit: SurfaceHit<R>,
+    /// Whether the ray passes to the other side, rather than touching the surface: tangent to a sphere, at the edge of a
+    /// box, through the apex of a cone. The boundary of a solid is crossed an even number of times by every line.
+    pub crosses: bool,
+}
+
+/// What is asked about each exact hit; it may stop the search.
+pub type ExactVisitor<'a, R> = dyn FnMut(ExactSurfaceHit<R>) -> ControlFlow<()> + 'a;
+
 /// What every primitive answers, in the arithmetic of `R`.
 pub trait Primitive<R: Real> {
     /// A box that holds the primitive (infinite for unbounded ones). Conservative: no point of the surface, nor a
@@ -47,6 +62,42 @@ pub trait Primitive<R: Real> {
     /// The nearest hit by the shortest formulas (tier `Fast`).
     fn closest_hit_fast(&self, ray: &Ray<R>) -> Option<SurfaceHit<R>> {
         self.closest_hit(ray)
+    }
+
+    /// Visits every hit in the closed interval, in ascending order, until the visitor breaks (tier `Exact`).
+    ///
+    /// The surface is the one that the parameters describe as they are stored, the ray is what its numbers are, and for
+    /// these the decisions are exact: hit or miss, which roots are in the interval and within bounds and rims. `t` is
+    /// the root rounded to nearest, ties to even; a root beyond the largest number of `R` is no hit.
+    ///
+    /// Returns whether `f64`, and twice its digits, could not decide, and exact numbers were needed.
+    ///
+    /// ```
+    /// use core::ops::ControlFlow;
+    /// use firsthit_geometry::{Primitive, Ray, shapes::Sphere};
+    /// use glam::DVec3;
+    /// let sphere = Sphere::new(DVec3::ZERO, 1.0)?;
+    /// let mut hits = Vec::new();
+    /// let visit = &mut |h: firsthit_geometry::ExactSurfaceHit<f64>| {
+    ///     hits.push((h.hit.t, h.crosses));
+    ///     ControlFlow::Continue(())
+    /// };
+    /// // Tangent: touched once, at the point itself. One unit in the last place further out: missed.
+    /// sphere.visit_exact(&Ray::new(DVec3::new(1.0, 0.0, 5.0), DVec3::NEG_Z), visit);
+    /// sphere.visit_exact(&Ray::new(DVec3::new(1.0_f64.next_up(), 0.0, 5.0), DVec3::NEG_Z), visit);
+    /// assert_eq!(hits, [(5.0, false)]);
+    /// # Ok::<(), firsthit_geometry::ShapeError>(())
+    /// ```
+    fn visit_exact(&self, ray: &Ray<R>, visit: &mut ExactVisitor<'_, R>) -> bool;
+
+    /// The first hit of [`Primitive::visit_exact`].
+    fn closest_hit_exact(&self, ray: &Ray<R>) -> Option<SurfaceHit<R>> {
+        let mut first = None;
+        self.visit_exact(ray, &mut |found| {
+            first = Some(found.hit);
+            ControlFlow::Break(())
+        });
+        first
     }
 
     /// Whether anything is hit in the closed interval: the same decision as [`Primitive::closest_hit`].
@@ -108,6 +159,7 @@ pub enum ShapeError {
 mod common;
 mod cuboid;
 mod disk;
+mod exact;
 mod plane;
 mod polygon;
 mod quadric;
@@ -197,6 +249,9 @@ impl<R: Real> Primitive<R> for Shape<R> {
     }
     fn closest_hit_fast(&self, ray: &Ray<R>) -> Option<SurfaceHit<R>> {
         self.primitive().closest_hit_fast(ray)
+    }
+    fn visit_exact(&self, ray: &Ray<R>, visit: &mut ExactVisitor<'_, R>) -> bool {
+        self.primitive().visit_exact(ray, visit)
     }
     fn any_hit(&self, ray: &Ray<R>) -> bool {
         self.primitive().any_hit(ray)

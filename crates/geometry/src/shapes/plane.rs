@@ -1,7 +1,9 @@
 //! Infinite planes.
 
 use super::common::{balanced, cast, finite, tangents, unit};
-use super::{Primitive, ShapeError, SurfaceHit};
+use super::exact::{OnPlane, visit_roots};
+use super::{ExactVisitor, Primitive, ShapeError, SurfaceHit};
+use crate::exact::quadratic::Quadratic;
 use crate::{Aabb, Ray, Real, Vector3};
 
 /// All points `p` with `normal . (p - point) = 0`.
@@ -14,7 +16,9 @@ use crate::{Aabb, Ray, Real, Vector3};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane<R: Real> {
     point: R::Vec3,
-    /// The normal as given, but for a power of two: dividing by its length would tilt the plane by the rounding.
+    /// The normal as given: dividing by its length would tilt the plane by the rounding.
+    given: R::Vec3,
+    /// The same but for a power of two, so that products stay in range.
     raw: R::Vec3,
     /// The unit normal.
     normal: R::Vec3,
@@ -31,7 +35,7 @@ impl<R: Real> Plane<R> {
         finite::<R>("point", point)?;
         finite::<R>("normal", normal)?;
         let unit = unit::<R>(normal).ok_or(ShapeError::Degenerate("the normal is zero"))?;
-        Ok(Self { point, raw: balanced::<R>(normal), normal: unit, cull_back: false })
+        Ok(Self { point, given: normal, raw: balanced::<R>(normal), normal: unit, cull_back: false })
     }
 
     /// The same plane with culling of its back side on or off.
@@ -57,7 +61,9 @@ impl<R: Real> Plane<R> {
     /// # Errors
     /// When a parameter leaves the range of `S`.
     pub fn cast<S: Real>(&self) -> Result<Plane<S>, ShapeError> {
-        let plane = Plane::new(cast::<R, S>(self.point), cast::<R, S>(self.raw))?;
+        // The smaller arithmetic may not hold a long or short normal.
+        let same = cast::<R, S>(self.given).to_f64() == self.given.to_f64();
+        let plane = Plane::new(cast::<R, S>(self.point), cast::<R, S>(if same { self.given } else { self.raw }))?;
         Ok(plane.with_culling(self.cull_back))
     }
 
@@ -84,6 +90,20 @@ impl<R: Real> Plane<R> {
         self.crossing(ray).filter(|&t| ray.contains(t) && t.is_finite())
     }
 
+    fn hit(&self, ray: &Ray<R>, t: R) -> SurfaceHit<R> {
+        let l = (ray.origin - self.point) + ray.direction * t;
+        let (tangent, bitangent) = tangents::<R>(self.normal);
+        SurfaceHit::new(t, l.dot(tangent), l.dot(bitangent), Some(self.normal))
+    }
+
+    /// The exact equation along a valid ray; `None` for a ray that comes from a culled side.
+    pub(super) fn equation(&self, ray: &Ray<R>) -> Option<Quadratic<OnPlane>> {
+        let Ray { origin, direction, .. } = ray.to_f64();
+        let equation = OnPlane { origin, direction, point: self.point.to_f64(), normal: self.given.to_f64() };
+        let equation = ray.is_valid().then(|| Quadratic::new(equation))?;
+        (!self.cull_back || equation.slope() <= 0).then_some(equation)
+    }
+
     /// Projects a point onto the plane; see [`Primitive::refine`].
     pub(super) fn project(&self, point: R::Vec3) -> (R::Vec3, R) {
         let l = point - self.point;
@@ -100,10 +120,12 @@ impl<R: Real> Primitive<R> for Plane<R> {
     }
 
     fn closest_hit(&self, ray: &Ray<R>) -> Option<SurfaceHit<R>> {
-        let t = self.nearest(ray)?;
-        let l = (ray.origin - self.point) + ray.direction * t;
-        let (tangent, bitangent) = tangents::<R>(self.normal);
-        Some(SurfaceHit::new(t, l.dot(tangent), l.dot(bitangent), Some(self.normal)))
+        self.nearest(ray).map(|t| self.hit(ray, t))
+    }
+
+    fn visit_exact(&self, ray: &Ray<R>, visit: &mut ExactVisitor<'_, R>) -> bool {
+        let Some(equation) = self.equation(ray) else { return false };
+        visit_roots(&equation, ray, |_| true, |t| self.hit(ray, t), visit)
     }
 
     fn any_hit(&self, ray: &Ray<R>) -> bool {

@@ -3,7 +3,10 @@
 use glam::DVec3;
 
 use super::common::{cast, finite, padded, unit};
-use super::{Plane, Primitive, ShapeError, SurfaceHit};
+use super::exact::{Coordinate, visit_roots};
+use super::{ExactVisitor, Plane, Primitive, ShapeError, SurfaceHit};
+use crate::exact::number::{Number, cross, differences, dot, vector};
+use crate::exact::quadratic::{Equation, Formula, Quadratic};
 use crate::{Aabb, Ray, Real, Vector3};
 
 /// A flat polygon given by vertex loops; the last vertex of a loop joins the first.
@@ -16,11 +19,15 @@ use crate::{Aabb, Ray, Real, Vector3};
 /// orientation, as in a figure of eight. `u` and `v` run from 0 to 1 across the bounds of the two coordinates kept
 /// when the one with the largest normal component is dropped, in the order x, y, z.
 ///
-/// Error of `t`: that of [`Plane`].
+/// Error of `t`: that of [`Plane`]. Exactly, the plane is that of three vertices far apart: the first one, the one
+/// farthest from it, and the one farthest from the line through both. If all vertices lie in one plane exactly, it is
+/// that plane.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Polygon<R: Real> {
     loops: Vec<Vec<R::Vec3>>,
     plane: Plane<R>,
+    /// Three vertices that span the exact plane.
+    span: [R::Vec3; 3],
     normal: Option<R::Vec3>,
     bounds: Aabb<R>,
     /// The two axes that are kept.
@@ -82,7 +89,8 @@ impl<R: Real> Polygon<R> {
         let origin = exact(loops[0][0]);
         let (newell, terms) = newell::<R>(&loops[0], exact);
         let oriented = newell.length() > 1e-10 * terms;
-        let direction = if oriented { newell } else { widest::<R>(&loops, exact) };
+        let (span, across) = widest::<R>(&loops, exact);
+        let direction = if oriented { newell } else { across };
         let direction = unit::<f64>(direction).ok_or(ShapeError::Degenerate("all vertices lie on a line"))?;
 
         let off = |v: &R::Vec3| (exact(*v) - origin).dot(direction).abs() * unit_size;
@@ -107,7 +115,7 @@ impl<R: Real> Polygon<R> {
             |l: &Vec<R::Vec3>| l.iter().zip(l.iter().cycle().skip(1)).map(|(&a, &b)| (a, b)).collect::<Vec<_>>();
         let edges = loops.iter().flat_map(closed).filter_map(|(a, b)| Edge::new(flat(a), flat(b))).collect();
         let normal = oriented.then(|| plane.normal());
-        Ok(Self { loops, plane, normal, bounds, kept, scale, edges })
+        Ok(Self { loops, plane, span, normal, bounds, kept, scale, edges })
     }
 
     /// The vertex loops as given.
@@ -137,6 +145,15 @@ impl<R: Real> Polygon<R> {
         self.edges.iter().fold(false, |inside, edge| inside != edge.crosses(p))
     }
 
+    fn hit(&self, ray: &Ray<R>, t: R) -> SurfaceHit<R> {
+        let p = ray.at(t);
+        let [u, v] = self.kept.map(|axis| {
+            let (low, high) = (self.bounds.min.axis(axis), self.bounds.max.axis(axis));
+            ((p.axis(axis) - low) / (high - low)).max(R::ZERO).min(R::ONE)
+        });
+        SurfaceHit::new(t, u, v, self.normal)
+    }
+
     fn nearest(&self, ray: &Ray<R>) -> Option<R> {
         self.plane.nearest(ray).filter(|&t| self.contains(ray.at(t)))
     }
@@ -153,15 +170,83 @@ fn newell<R: Real>(vertices: &[R::Vec3], exact: impl Fn(R::Vec3) -> DVec3) -> (D
     })
 }
 
-/// A normal of the plane of loops whose first has no area: from the vertex farthest from the first one and the vertex
-/// farthest from the line through both. Zero when all lie on a line.
-fn widest<R: Real>(loops: &[Vec<R::Vec3>], exact: impl Fn(R::Vec3) -> DVec3) -> DVec3 {
-    let origin = exact(loops[0][0]);
-    let arms = || loops.iter().flatten().map(|&v| exact(v) - origin);
-    let longest = |a: DVec3, b: DVec3| if b.length_squared() > a.length_squared() { b } else { a };
-    let axis = arms().fold(DVec3::ZERO, longest);
-    let normal = arms().map(|v| axis.cross(v)).fold(DVec3::ZERO, longest);
-    if normal.length() > 1e-10 * axis.length_squared() { normal } else { DVec3::ZERO }
+/// Three vertices far apart: the first, the farthest from it, and the farthest from the line through both; and a normal
+/// of their plane, zero when all vertices lie on a line.
+fn widest<R: Real>(loops: &[Vec<R::Vec3>], exact: impl Fn(R::Vec3) -> DVec3) -> ([R::Vec3; 3], DVec3) {
+    let first = loops[0][0];
+    let arm = |v: R::Vec3| exact(v) - exact(first);
+    let largest = |measure: &dyn Fn(DVec3) -> DVec3| {
+        let size = |v: R::Vec3| measure(arm(v)).length_squared();
+        loops.iter().flatten().fold(first, |best, &v| if size(v) > size(best) { v } else { best })
+    };
+    let second = largest(&|v| v);
+    let axis = arm(second);
+    let third = largest(&|v| axis.cross(v));
+    let normal = axis.cross(arm(third));
+    let flat = normal.length() > 1e-10 * axis.length_squared();
+    ([first, second, third], if flat { normal } else { DVec3::ZERO })
+}
+
+/// `n.(o + t d - a) = 0`, `n = (b - a) x (c - a)`.
+struct Spanned {
+    ray: Ray<f64>,
+    corners: [DVec3; 3],
+}
+
+impl Equation for Spanned {
+    fn coefficients<N: Number>(&self) -> [N; 3] {
+        let [a, b, c] = self.corners;
+        let n = cross::<N>(&differences(b, a), &differences(c, a));
+        let offset = dot(&n, &differences(self.ray.origin, a));
+        [N::new(0.0), dot(&n, &vector(self.ray.direction)), offset.twice()]
+    }
+}
+
+/// On which side of an edge the hit point is: `(b - a) x (p - a)`, times `2 B`. The coordinates are those of the point.
+struct Turn {
+    from: [f64; 2],
+    to: [f64; 2],
+    coordinates: [Coordinate; 2],
+}
+
+impl Formula for Turn {
+    fn value<N: Number>(&self, equation: &[N; 3]) -> N {
+        let [x, y] = [0, 1].map(|i| self.coordinates[i].value(equation));
+        let [dx, dy] = [0, 1].map(|i| N::difference(self.to[i], self.from[i]));
+        dx.times(&y).minus(&x.times(&dy))
+    }
+}
+
+impl<R: Real> Polygon<R> {
+    /// [`Self::contains`] for the exact hit point.
+    fn contains_hit(&self, equation: &Quadratic<Spanned>) -> bool {
+        let ray = equation.equation().ray;
+        let coordinate = |i: usize, from: f64| Coordinate {
+            origin: ray.origin[self.kept[i]],
+            direction: ray.direction[self.kept[i]],
+            from,
+        };
+        let flip = equation.slope();
+        let lies_below = |v: [f64; 2]| equation.sign(&coordinate(1, v[1])) * flip < 0;
+        let flat = |v: &R::Vec3| self.kept.map(|axis| v.axis(axis).to_f64());
+        let mut inside = false;
+        for vertices in &self.loops {
+            let mut a = flat(&vertices[vertices.len() - 1]);
+            let mut a_above = lies_below(a);
+            for v in vertices {
+                let b = flat(v);
+                let b_above = lies_below(b);
+                if a_above != b_above {
+                    // From the lower end, as the half-open rule has it, to the higher one.
+                    let (from, to) = if b_above { (a, b) } else { (b, a) };
+                    let coordinates = [coordinate(0, from[0]), coordinate(1, from[1])];
+                    inside ^= equation.sign(&Turn { from, to, coordinates }) * flip > 0;
+                }
+                (a, a_above) = (b, b_above);
+            }
+        }
+        inside
+    }
 }
 
 impl<R: Real> Primitive<R> for Polygon<R> {
@@ -171,13 +256,16 @@ impl<R: Real> Primitive<R> for Polygon<R> {
     }
 
     fn closest_hit(&self, ray: &Ray<R>) -> Option<SurfaceHit<R>> {
-        let t = self.nearest(ray)?;
-        let p = ray.at(t);
-        let [u, v] = self.kept.map(|axis| {
-            let (low, high) = (self.bounds.min.axis(axis), self.bounds.max.axis(axis));
-            ((p.axis(axis) - low) / (high - low)).max(R::ZERO).min(R::ONE)
-        });
-        Some(SurfaceHit::new(t, u, v, self.normal))
+        self.nearest(ray).map(|t| self.hit(ray, t))
+    }
+
+    fn visit_exact(&self, ray: &Ray<R>, visit: &mut ExactVisitor<'_, R>) -> bool {
+        if !ray.is_valid() {
+            return false;
+        }
+        let corners = self.span.map(Vector3::to_f64);
+        let equation = Quadratic::new(Spanned { ray: ray.to_f64(), corners });
+        visit_roots(&equation, ray, |_| self.contains_hit(&equation), |t| self.hit(ray, t), visit)
     }
 
     fn any_hit(&self, ray: &Ray<R>) -> bool {

@@ -1,8 +1,11 @@
 //! Quadric surfaces: one equation for cylinder, cone, ellipsoid, paraboloid and hyperboloids.
 
 use super::common::{cast, finite_number, longitude, padded, positive, unit};
+use super::exact::{in_box, visit_roots};
 use super::quadric_bounds::{region_bounds, surface_bounds};
-use super::{Primitive, ShapeError, SurfaceHit};
+use super::{ExactVisitor, Primitive, ShapeError, SurfaceHit};
+use crate::exact::number::{Number, dot, vector};
+use crate::exact::quadratic::{Equation, Quadratic};
 use crate::quadratic::{first_admitted, roots};
 use crate::{Aabb, Ray, Real, Vector3};
 
@@ -58,6 +61,7 @@ impl QuadricKind {
 ///
 /// Error of `t`: `16 kappa u` relative, `kappa` the condition of the root. The equation is solved from the point of the
 /// ray where its terms are smallest, in units of the surface's size, or the constant term would lose its digits far away.
+/// Exactly, the surface is that of the coefficients as they are stored; the named constructors round those once or twice.
 ///
 /// ```
 /// use firsthit_geometry::{Primitive, Ray, shapes::Quadric};
@@ -379,6 +383,40 @@ impl<R: Real> Quadric<R> {
     }
 }
 
+/// The form along a line, from the coefficients and the origin as they are given.
+pub(super) struct OnQuadric {
+    pub(super) ray: Ray<f64>,
+    coefficients: [f64; 10],
+}
+
+impl Equation for OnQuadric {
+    fn coefficients<N: Number>(&self) -> [N; 3] {
+        let [a, b, c, d, e, f, g, h, i, j] = self.coefficients.map(N::new);
+        let (origin, direction) = (vector(self.ray.origin), vector(self.ray.direction));
+        let rows = [[a, b.clone(), c.clone()], [b, e, f.clone()], [c, f, h]];
+        let linear = |v: &[N; 3]| [dot(&rows[0], v), dot(&rows[1], v), dot(&rows[2], v)];
+        let g = [d, g, i];
+        let [x, y, z] = linear(&origin);
+        let half_gradient = [x.plus(&g[0]), y.plus(&g[1]), z.plus(&g[2])];
+        let constant = dot(&origin, &half_gradient).plus(&dot(&origin, &g)).plus(&j);
+        [dot(&direction, &linear(&direction)), dot(&direction, &half_gradient), constant]
+    }
+}
+
+impl<R: Real> Quadric<R> {
+    /// The exact equation along a ray.
+    pub(super) fn equation(&self, ray: &Ray<R>) -> Quadratic<OnQuadric> {
+        Quadratic::new(OnQuadric { ray: ray.to_f64(), coefficients: self.coefficients.map(R::to_f64) })
+    }
+
+    /// The hit at a known parameter.
+    pub(super) fn hit(&self, ray: &Ray<R>, t: R) -> SurfaceHit<R> {
+        // Along the line that starts where the terms are small, so that the point has its digits.
+        let line = self.local(ray);
+        self.surface_hit(t, Self::local_point(&line, t / line.scale - line.shift))
+    }
+}
+
 /// The size of a surface (a power of two) and its coefficients in that unit, scaled to about 1. All exact.
 fn normalized(q: [f64; 10]) -> (f64, [f64; 10]) {
     let largest = |indices: &[usize]| indices.iter().fold(0.0, |m: f64, &i| m.max(q[i].abs()));
@@ -410,6 +448,15 @@ impl<R: Real> Primitive<R> for Quadric<R> {
         let inside = |t: &R| self.clip.contains(ray.at(*t));
         let t = roots.into_iter().filter(inside).find(|&t| first_admitted(ray, [t; 2]).is_some())?;
         Some(self.surface_hit(t, ray.at(t) * (R::ONE / self.size)))
+    }
+
+    fn visit_exact(&self, ray: &Ray<R>, visit: &mut ExactVisitor<'_, R>) -> bool {
+        if !ray.is_valid() {
+            return false;
+        }
+        let (equation, clip) = (self.equation(ray), self.clip.to_f64());
+        let inside = |side| in_box(&equation, side, &equation.equation().ray, &clip);
+        visit_roots(&equation, ray, inside, |t| self.hit(ray, t), visit)
     }
 
     fn any_hit(&self, ray: &Ray<R>) -> bool {

@@ -1,8 +1,13 @@
 //! Quadrics closed by caps.
 
+use core::cmp::Ordering;
+
 use super::common::padded;
-use super::cuboid::stay;
-use super::{Cuboid, Primitive, Quadric, ShapeError, SurfaceHit};
+use super::cuboid::{ExactEnd, exact_stay, stay};
+use super::exact::visit_at;
+use super::quadric::OnQuadric;
+use super::{Cuboid, ExactSurfaceHit, ExactVisitor, Primitive, Quadric, ShapeError, SurfaceHit};
+use crate::exact::quadratic::{Count, Quadratic, Side};
 use crate::quadratic::roots;
 use crate::{Aabb, Ray, Real, Vector3};
 
@@ -99,6 +104,62 @@ impl<R: Real> Solid<R> {
     }
 }
 
+/// [`End`], exactly.
+#[derive(Clone, Copy)]
+enum ExactPlace {
+    Side(Side),
+    Cap(ExactEnd),
+}
+
+/// Compares and rounds the ends of pieces of a line.
+struct Ends<'a> {
+    equation: &'a Quadratic<OnQuadric>,
+    fallback: bool,
+}
+
+impl Ends<'_> {
+    fn order(&mut self, a: ExactPlace, b: ExactPlace) -> Ordering {
+        match (a, b) {
+            (ExactPlace::Cap(a), ExactPlace::Cap(b)) => a.at.order(b.at, &mut self.fallback),
+            (ExactPlace::Side(a), ExactPlace::Cap(b)) => self.equation.order(a, b.at),
+            (ExactPlace::Cap(a), ExactPlace::Side(b)) => self.equation.order(b, a.at).reverse(),
+            (ExactPlace::Side(a), ExactPlace::Side(b)) if self.equation.count() == Count::Two => {
+                (a == Side::Upper).cmp(&(b == Side::Upper))
+            }
+            (ExactPlace::Side(_), ExactPlace::Side(_)) => Ordering::Equal,
+        }
+    }
+
+    fn is_in(&mut self, place: ExactPlace, ray: &Ray<f64>) -> bool {
+        match place {
+            ExactPlace::Side(side) => self.equation.admits(side, ray),
+            ExactPlace::Cap(end) => end.at.is_in(ray, &mut self.fallback),
+        }
+    }
+
+    fn nearest<R: Real>(&mut self, place: ExactPlace) -> R {
+        match place {
+            ExactPlace::Side(side) => self.equation.nearest(side),
+            ExactPlace::Cap(end) => end.nearest(&mut self.fallback),
+        }
+    }
+}
+
+/// The pieces of a line on which a form is not positive, each end `None` where there is none.
+fn pieces(equation: &Quadratic<OnQuadric>) -> [Option<[Option<Side>; 2]>; 2] {
+    let (lower, upper) = (Some(Side::Lower), Some(Side::Upper));
+    match (equation.leading(), equation.count()) {
+        (1, Count::Two | Count::Double) => [Some([lower, upper]), None],
+        (-1, Count::Two | Count::Double) => [Some([None, lower]), Some([upper, None])],
+        (_, Count::Simple) if equation.slope() > 0 => [Some([None, lower]), None],
+        (_, Count::Simple) => [Some([lower, None]), None],
+        // The sign never changes.
+        (1, _) => [None; 2],
+        (-1, _) => [Some([None; 2]), None],
+        _ => [(equation.constant() <= 0).then_some([None; 2]), None],
+    }
+}
+
 impl<R: Real> Primitive<R> for Solid<R> {
     fn bounds(&self) -> Aabb<R> {
         padded(self.bounds)
@@ -106,6 +167,53 @@ impl<R: Real> Primitive<R> for Solid<R> {
 
     fn closest_hit(&self, ray: &Ray<R>) -> Option<SurfaceHit<R>> {
         self.nearest(ray)
+    }
+
+    fn visit_exact(&self, ray: &Ray<R>, visit: &mut ExactVisitor<'_, R>) -> bool {
+        if !ray.is_valid() {
+            return false;
+        }
+        let (equation, line) = (self.surface.equation(ray), ray.to_f64());
+        let mut ends = Ends { equation: &equation, fallback: false };
+        let Some(stay) = exact_stay(&self.surface.clip().to_f64(), &line, &mut ends.fallback) else {
+            return ends.fallback;
+        };
+        let (enter, exit) = (stay.enter.map(ExactPlace::Cap), stay.exit.map(ExactPlace::Cap));
+        for [low, high] in pieces(&equation).into_iter().flatten() {
+            let (low, high) = (low.map(ExactPlace::Side), high.map(ExactPlace::Side));
+            // Where side and cap coincide, the side.
+            let first = match (low, enter) {
+                (Some(a), Some(b)) => Some(if ends.order(a, b).is_ge() { a } else { b }),
+                (a, b) => a.or(b),
+            };
+            let last = match (high, exit) {
+                (Some(a), Some(b)) => Some(if ends.order(a, b).is_le() { a } else { b }),
+                (a, b) => a.or(b),
+            };
+            let order = match (first, last) {
+                (Some(a), Some(b)) => ends.order(a, b),
+                _ => Ordering::Less,
+            };
+            if order.is_gt() {
+                continue;
+            }
+            for place in [first, last.filter(|_| order.is_lt())].into_iter().flatten() {
+                if !ends.is_in(place, &line) {
+                    continue;
+                }
+                let found = |t: R| {
+                    let hit = match place {
+                        ExactPlace::Side(_) => self.surface.hit(ray, t),
+                        ExactPlace::Cap(end) => Cuboid::face_hit(&self.bounds, ray, t, end.axis, end.entry),
+                    };
+                    ExactSurfaceHit { hit, crosses: order.is_lt() }
+                };
+                if visit_at(ends.nearest(place), found, visit).is_break() {
+                    return ends.fallback || equation.fallback();
+                }
+            }
+        }
+        ends.fallback || equation.fallback()
     }
 
     /// On a cap sets the coordinate of its plane, on the side as for the quadric.

@@ -1,7 +1,12 @@
-//! Spheres, solved twice: algebraically and geometrically.
+//! Spheres, solved twice: algebraically and geometrically; and exactly.
+
+use glam::DVec3;
 
 use super::common::{cast, finite, longitude, padded, positive, unit};
-use super::{Primitive, ShapeError, SurfaceHit};
+use super::exact::visit_roots;
+use super::{ExactVisitor, Primitive, ShapeError, SurfaceHit};
+use crate::exact::number::{Number, differences, dot, vector};
+use crate::exact::quadratic::{Equation, Quadratic};
 use crate::quadratic::{first_admitted, roots_of_discriminant};
 use crate::{Aabb, Ray, Real, Vector3};
 
@@ -102,6 +107,20 @@ impl<R: Real> Sphere<R> {
     }
 }
 
+/// `|o + t d - c|^2 = r^2`
+struct OnSphere {
+    ray: Ray<f64>,
+    center: DVec3,
+    radius: f64,
+}
+
+impl Equation for OnSphere {
+    fn coefficients<N: Number>(&self) -> [N; 3] {
+        let (l, d) = (differences(self.ray.origin, self.center), vector(self.ray.direction));
+        [dot(&d, &d), dot(&l, &d), dot(&l, &l).minus(&N::new(self.radius).squared())]
+    }
+}
+
 impl<R: Real> Primitive<R> for Sphere<R> {
     fn bounds(&self) -> Aabb<R> {
         let r = R::Vec3::splat(self.radius);
@@ -115,6 +134,15 @@ impl<R: Real> Primitive<R> for Sphere<R> {
     fn closest_hit_fast(&self, ray: &Ray<R>) -> Option<SurfaceHit<R>> {
         let t = ray.is_valid().then(|| self.roots_algebraic(ray)).flatten();
         t.and_then(|roots| first_admitted(ray, roots)).map(|t| self.hit(ray, t))
+    }
+
+    fn visit_exact(&self, ray: &Ray<R>, visit: &mut ExactVisitor<'_, R>) -> bool {
+        if !ray.is_valid() {
+            return false;
+        }
+        let (center, radius) = (self.center.to_f64(), self.radius.to_f64());
+        let quadratic = Quadratic::new(OnSphere { ray: ray.to_f64(), center, radius });
+        visit_roots(&quadratic, ray, |_| true, |t| self.hit(ray, t), visit)
     }
 
     fn any_hit(&self, ray: &Ray<R>) -> bool {

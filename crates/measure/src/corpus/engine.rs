@@ -252,7 +252,10 @@ fn build(prim: &Primitive, precision: Precision, layout: Layout) -> Result<Optio
 }
 
 /// The analytic shape of a case, if it is one.
-fn shape<R: Real>(prim: &Primitive) -> Result<Option<Shape<R>>, ShapeError> {
+///
+/// # Errors
+/// When no such shape can be made.
+pub fn shape<R: Real>(prim: &Primitive) -> Result<Option<Shape<R>>, ShapeError> {
     let number = |b: super::Bits| R::from_f32(b.0);
     Ok(Some(match prim {
         Primitive::Sphere { c, r } => Sphere::new(cast::<R>(*c), number(*r))?.into(),

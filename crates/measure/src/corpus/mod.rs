@@ -12,7 +12,7 @@ use firsthit_geometry::Ray;
 use glam::Vec3;
 use serde::{Deserialize, Deserializer, de};
 
-pub use engine::{Answer, Engine, Form, Found};
+pub use engine::{Answer, Engine, Form, Found, shape};
 pub use judge::{Verdict, judge, required};
 pub use read::{CorpusError, read};
 pub use run::{Complaint, Report, Row, run};

@@ -1,0 +1,342 @@
+//! Where a ray meets a surface of degree two or one: real roots, compared and rounded exactly.
+//!
+//! No square root is taken but for a first guess. How a root of `A t^2 + 2 B t + C` compares with a number `x` follows
+//! from the signs of `A x^2 + 2 B x + C`, which tells whether `x` lies between the roots, and of `A x + B`, which
+//! tells on which side of their middle. Rounding a root is comparing it with the two numbers halfway to the neighbours
+//! of a candidate. All that is needed of coefficients are signs, so each is asked of the cheapest [`Number`] first.
+
+use core::cell::{Cell, OnceCell};
+use core::cmp::Ordering;
+
+use super::dyadic::{Dyadic, Place};
+use super::number::{Ball, Number, Wide};
+use crate::{Ray, Real};
+
+/// What gives a quadratic its coefficients `A`, `B`, `C` of `A t^2 + 2 B t + C`.
+pub(crate) trait Equation {
+    fn coefficients<N: Number>(&self) -> [N; 3];
+}
+
+/// A polynomial in the coefficients of an equation, of which the sign is asked.
+pub(crate) trait Formula {
+    fn value<N: Number>(&self, coefficients: &[N; 3]) -> N;
+}
+
+/// The number `(a - b) / c`, `c > 0`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Fraction {
+    a: f64,
+    b: f64,
+    c: f64,
+}
+
+impl Fraction {
+    /// Finite numbers; `c` is not 0.
+    pub(crate) fn new(a: f64, b: f64, c: f64) -> Self {
+        if c < 0.0 { Self { a: b, b: a, c: -c } } else { Self { a, b, c } }
+    }
+
+    /// Halfway between neighbours among the numbers of `R`; half a step beyond the last one where one is infinite.
+    fn between<R: Real>(low: R, high: R) -> Self {
+        let half_step = 0.5 * (R::MAX.to_f64() - R::MAX.next_down().to_f64());
+        match (low.is_finite(), high.is_finite()) {
+            (true, true) => Self::new(low.to_f64(), -high.to_f64(), 2.0),
+            (true, false) => Self::new(low.to_f64(), -half_step, 1.0),
+            _ => Self::new(high.to_f64(), half_step, 1.0),
+        }
+    }
+
+    fn parts<N: Number>(self) -> (N, N) {
+        (N::difference(self.a, self.b), N::new(self.c))
+    }
+
+    /// How it compares with another one; sets `fallback` if exact numbers were needed for that.
+    pub(crate) fn order(self, o: Self, fallback: &mut bool) -> Ordering {
+        fn sign<N: Number>(x: Fraction, y: Fraction) -> Option<i32> {
+            let ((n, m), (p, q)) = (x.parts::<N>(), y.parts::<N>());
+            n.times(&q).minus(&p.times(&m)).sign()
+        }
+        let quick = sign::<Ball>(self, o).or_else(|| sign::<Wide>(self, o));
+        *fallback |= quick.is_none();
+        quick.or_else(|| sign::<Dyadic>(self, o)).unwrap_or(0).cmp(&0)
+    }
+
+    /// Whether it lies in the closed interval of a ray.
+    pub(crate) fn is_in(self, ray: &Ray<f64>, fallback: &mut bool) -> bool {
+        self.is_from(ray.t_min, fallback) && self.is_to(ray.t_max, fallback)
+    }
+
+    /// Whether it is at least `t`, maybe infinite.
+    pub(crate) fn is_from(self, t: f64, fallback: &mut bool) -> bool {
+        if t.is_finite() { self.order(t.into(), fallback).is_ge() } else { t < 0.0 }
+    }
+
+    /// Whether it is at most `t`, maybe infinite.
+    pub(crate) fn is_to(self, t: f64, fallback: &mut bool) -> bool {
+        if t.is_finite() { self.order(t.into(), fallback).is_le() } else { t > 0.0 }
+    }
+}
+
+/// The root of `c t = a - b`.
+impl Equation for Fraction {
+    fn coefficients<N: Number>(&self) -> [N; 3] {
+        let (n, m) = self.parts::<N>();
+        [N::new(0.0), m, N::new(0.0).minus(&n.twice())]
+    }
+}
+
+impl From<f64> for Fraction {
+    fn from(x: f64) -> Self {
+        Self { a: x, b: 0.0, c: 1.0 }
+    }
+}
+
+/// Which root; both are the same where there is one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Side {
+    Lower,
+    Upper,
+}
+
+/// How many real roots.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Count {
+    None,
+    /// Of an equation of degree one.
+    Simple,
+    /// The surface is touched, not crossed.
+    Double,
+    Two,
+}
+
+impl Count {
+    pub(crate) fn sides(self) -> &'static [Side] {
+        match self {
+            Self::None => &[],
+            Self::Simple | Self::Double => &[Side::Lower],
+            Self::Two => &[Side::Lower, Side::Upper],
+        }
+    }
+}
+
+/// An equation with what is known about it.
+pub(crate) struct Quadratic<E> {
+    equation: E,
+    ball: [Ball; 3],
+    wide: OnceCell<[Wide; 3]>,
+    exact: OnceCell<[Dyadic; 3]>,
+    leading: Cell<Option<i32>>,
+}
+
+impl<E: Equation> Quadratic<E> {
+    pub(crate) fn new(equation: E) -> Self {
+        let ball = equation.coefficients();
+        Self { equation, ball, wide: OnceCell::new(), exact: OnceCell::new(), leading: Cell::new(None) }
+    }
+
+    pub(crate) fn equation(&self) -> &E {
+        &self.equation
+    }
+
+    fn wide(&self) -> &[Wide; 3] {
+        self.wide.get_or_init(|| self.equation.coefficients())
+    }
+
+    fn exact(&self) -> &[Dyadic; 3] {
+        self.exact.get_or_init(|| self.equation.coefficients())
+    }
+
+    /// Whether exact numbers were needed so far.
+    pub(crate) fn fallback(&self) -> bool {
+        self.exact.get().is_some()
+    }
+
+    /// The sign of a formula.
+    pub(crate) fn sign(&self, formula: &impl Formula) -> i32 {
+        let quick = formula.value(&self.ball).sign();
+        quick.unwrap_or_else(|| self.careful(formula))
+    }
+
+    #[cold]
+    fn careful(&self, formula: &impl Formula) -> i32 {
+        let wide = formula.value(self.wide()).sign();
+        wide.or_else(|| formula.value(self.exact()).sign()).unwrap_or(0)
+    }
+
+    /// The sign of `A`: the degree, and the side on which the form is negative.
+    pub(crate) fn leading(&self) -> i32 {
+        self.leading.get().unwrap_or_else(|| {
+            let sign = self.sign(&Coefficient(0));
+            self.leading.set(Some(sign));
+            sign
+        })
+    }
+
+    /// The sign of `B`.
+    pub(crate) fn slope(&self) -> i32 {
+        self.sign(&Coefficient(1))
+    }
+
+    /// The sign of `C`, which is that of the form at the ray's origin.
+    pub(crate) fn constant(&self) -> i32 {
+        self.sign(&Coefficient(2))
+    }
+
+    pub(crate) fn count(&self) -> Count {
+        if self.leading() == 0 {
+            return if self.slope() == 0 { Count::None } else { Count::Simple };
+        }
+        match self.sign(&Discriminant) {
+            ..0 => Count::None,
+            0 => Count::Double,
+            1.. => Count::Two,
+        }
+    }
+
+    /// How a root compares with a number.
+    pub(crate) fn order(&self, side: Side, x: Fraction) -> Ordering {
+        self.order_by(side, |f| self.sign(f), &x)
+    }
+
+    /// The same, with `sign` to tell signs.
+    fn order_by<X>(&self, side: Side, sign: impl Fn(&At<'_, X>) -> i32, x: &X) -> Ordering {
+        let at = |degree| sign(&At { degree, x });
+        match self.leading() {
+            // The line rises with B: it is positive right of its root.
+            0 => (-at(2) * self.slope()).cmp(&0),
+            leading => match (at(2) * leading, side) {
+                (..0, Side::Lower) => Ordering::Less,
+                (..0, Side::Upper) => Ordering::Greater,
+                (value, side) => {
+                    // Right of the middle of the roots, or left.
+                    let right = at(1) * leading;
+                    match (value, side) {
+                        (_, Side::Lower) if right > 0 => Ordering::Less,
+                        (_, Side::Upper) if right < 0 => Ordering::Greater,
+                        (0, _) => Ordering::Equal,
+                        _ => (-right).cmp(&0),
+                    }
+                }
+            },
+        }
+    }
+
+    /// Whether a root lies in the closed interval of a ray.
+    pub(crate) fn admits(&self, side: Side, ray: &Ray<f64>) -> bool {
+        let from = if ray.t_min.is_finite() { self.order(side, ray.t_min.into()).is_ge() } else { ray.t_min < 0.0 };
+        let to = || if ray.t_max.is_finite() { self.order(side, ray.t_max.into()).is_le() } else { ray.t_max > 0.0 };
+        from && to()
+    }
+
+    /// A root rounded to the nearest number of `R`, ties to even; infinite beyond the last.
+    pub(crate) fn nearest<R: Real>(&self, side: Side) -> R {
+        // What f64 makes of it may do for f32, not for f64.
+        let single = is_single::<R>();
+        let quick = if single { self.confirmed(side, guess(&self.ball, side)) } else { None };
+        quick.or_else(|| self.confirmed(side, guess(self.wide(), side))).unwrap_or_else(|| {
+            let exact = self.exact();
+            let order = |x: &Dyadic| self.order_by(side, |f| f.value(exact).signum(), x);
+            let place = Place::find(guess(exact, side), order);
+            R::from_f64(if single { place.to_f32().into() } else { place.to_f64() })
+        })
+    }
+
+    /// The nearest number if it is the guess or next to it.
+    fn confirmed<R: Real>(&self, side: Side, guess: f64) -> Option<R> {
+        let mut x = R::from_f64(guess);
+        for _ in 0..3 {
+            if !x.is_finite() {
+                return None;
+            }
+            let (below, above) = (x.next_down(), x.next_up());
+            match self.order(side, Fraction::between(below, x)) {
+                Ordering::Less => x = below,
+                Ordering::Equal => return Some(even(below, x)),
+                Ordering::Greater => match self.order(side, Fraction::between(x, above)) {
+                    Ordering::Less => return Some(x),
+                    Ordering::Equal => return Some(even(x, above)),
+                    Ordering::Greater => x = above,
+                },
+            }
+        }
+        None
+    }
+}
+
+/// Whether `R` is `f32`.
+fn is_single<R: Real>() -> bool {
+    R::MAX.to_f64() < f64::MAX
+}
+
+/// Of two neighbours the one whose last bit is 0.
+fn even<R: Real>(a: R, b: R) -> R {
+    let odd = if is_single::<R>() { a.to_f32().to_bits() & 1 == 1 } else { a.to_f64().to_bits() & 1 == 1 };
+    if odd { b } else { a }
+}
+
+/// About a root, to a few units if the coefficients are that good; may be no number.
+fn guess<N: Number>(c: &[N; 3], side: Side) -> f64 {
+    let [a, b, k] = [c[0].value(), c[1].value(), c[2].value()];
+    if a == 0.0 {
+        let t = -k / (2.0 * b);
+        return polished(c, t);
+    }
+    let discriminant = Discriminant.value(c).value().max(0.0);
+    let q = -(b + discriminant.sqrt().copysign(b));
+    if q == 0.0 {
+        return 0.0;
+    }
+    let (s, t) = (q / a, k / q);
+    polished(c, if (s <= t) == (side == Side::Lower) { s } else { t })
+}
+
+/// One step of Newton's method.
+fn polished<N: Number>(c: &[N; 3], t: f64) -> f64 {
+    if !t.is_finite() {
+        return t;
+    }
+    let x = Fraction::from(t);
+    let step = At { degree: 2, x: &x }.value(c).value() / (2.0 * At { degree: 1, x: &x }.value(c).value());
+    if step.abs() <= 1e-9 * t.abs() { t - step } else { t }
+}
+
+struct Coefficient(usize);
+
+impl Formula for Coefficient {
+    fn value<N: Number>(&self, c: &[N; 3]) -> N {
+        c[self.0].clone()
+    }
+}
+
+struct Discriminant;
+
+impl Formula for Discriminant {
+    fn value<N: Number>(&self, [a, b, c]: &[N; 3]) -> N {
+        b.squared().minus(&a.times(c))
+    }
+}
+
+/// The form (degree 2) or half its derivative (degree 1) at `x`, times a positive number.
+struct At<'a, X> {
+    degree: u32,
+    x: &'a X,
+}
+
+/// `A n + B m`, or `(A n + 2 B m) n + C m^2`.
+fn at<N: Number>(degree: u32, [a, b, c]: &[N; 3], n: &N, m: &N) -> N {
+    let (an, bm) = (a.times(n), b.times(m));
+    if degree == 1 { an.plus(&bm) } else { an.plus(&bm.twice()).times(n).plus(&c.times(&m.squared())) }
+}
+
+impl Formula for At<'_, Fraction> {
+    fn value<N: Number>(&self, c: &[N; 3]) -> N {
+        let (n, m) = self.x.parts::<N>();
+        at(self.degree, c, &n, &m)
+    }
+}
+
+impl At<'_, Dyadic> {
+    fn value(&self, c: &[Dyadic; 3]) -> Dyadic {
+        at(self.degree, c, self.x, &Dyadic::new(1.0))
+    }
+}
