@@ -222,3 +222,68 @@ impl Number for Dyadic {
         self.approximate_quotient(&Self::new(1.0))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Near one another, so that differences cancel; or anything.
+    fn number() -> impl Strategy<Value = f64> {
+        prop_oneof![
+            3 => (-8i32..8).prop_map(f64::from),
+            3 => (-8i32..8, -4i64..4).prop_map(|(x, ulps)| f64::from_bits((f64::from(x).to_bits() as i64 + ulps) as u64)),
+            2 => (-1.0..1.0f64, -1074i32..1023).prop_map(|(x, e)| x * 2f64.powi(e / 2) * 2f64.powi(e - e / 2)),
+            1 => any::<f32>().prop_map(f64::from),
+        ]
+        .prop_filter("finite", |x| x.is_finite())
+    }
+
+    /// A sum, product or difference of what came before, in every step.
+    fn calculate<N: Number>(x: &[f64; 6], steps: &[(u8, usize, usize)]) -> N {
+        let mut known: Vec<N> = x.iter().map(|&x| N::new(x)).collect();
+        known.push(N::difference(x[0], x[1]));
+        for &(step, i, k) in steps {
+            let (a, b) = (&known[i % known.len()], &known[k % known.len()]);
+            known.push(match step % 3 {
+                0 => a.plus(b),
+                1 => a.minus(b),
+                _ => a.times(b),
+            });
+        }
+        known.swap_remove(known.len() - 1)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(20_000))]
+
+        #[test]
+        fn errors_are_within_their_bounds(
+            x in prop::array::uniform6(number()), steps in prop::collection::vec((0..3u8, 0..20usize, 0..20usize), 1..8)
+        ) {
+            let exact: Dyadic = calculate(&x, &steps);
+            let (ball, wide): (Ball, Wide) = (calculate(&x, &steps), calculate(&x, &steps));
+            for sign in [ball.sign(), wide.sign()].into_iter().flatten() {
+                prop_assert_eq!(sign, exact.signum());
+            }
+            if ball.value.is_finite() && ball.error.is_finite() {
+                let off = &exact - &Dyadic::new(ball.value);
+                prop_assert!(off.squared() <= Dyadic::new(ball.error).squared(), "{ball:?}");
+            }
+            if wide.value.high.is_finite() && wide.value.low.is_finite() && wide.error.is_finite() {
+                let off = &exact - &(Dyadic::new(wide.value.high) + Dyadic::new(wide.value.low));
+                prop_assert!(off.squared() <= Dyadic::new(wide.error).squared(), "{wide:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn zeros_are_known_to_be_zero() {
+        let zero = Ball::new(0.0).times(&Ball::new(0.1).times(&Ball::new(0.1)));
+        assert_eq!(zero.plus(&zero).sign(), Some(0));
+        assert_eq!(Ball::difference(0.1, 0.1).sign(), Some(0));
+        // Not exact, so not known.
+        let x = Ball::new(0.1).times(&Ball::new(0.1));
+        assert_eq!(x.minus(&x).sign(), None);
+    }
+}

@@ -340,3 +340,97 @@ impl At<'_, Dyadic> {
         at(self.degree, c, self.x, &Dyadic::new(1.0))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Coefficients as given.
+    struct Plain([f64; 3]);
+
+    impl Equation for Plain {
+        fn coefficients<N: Number>(&self) -> [N; 3] {
+            self.0.map(N::new)
+        }
+    }
+
+    fn coefficient() -> impl Strategy<Value = f64> {
+        prop_oneof![
+            3 => (-9i32..9).prop_map(f64::from),
+            2 => (-1.0..1.0f64, -60i32..60).prop_map(|(x, e)| x * 2f64.powi(e)),
+            1 => any::<u64>().prop_map(f64::from_bits).prop_filter("finite", |x| x.is_finite()),
+        ]
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(4000))]
+
+        /// Candidates confirmed by signs are what a search by exact comparisons finds, from a bad guess; and rounding to
+        /// f32 is not rounding twice.
+        #[test]
+        fn roots_are_correctly_rounded(c in [coefficient(), coefficient(), coefficient()], bad in -1e3..1e3f64) {
+            let q = Quadratic::new(Plain(c));
+            for &side in q.count().sides() {
+                let exact = q.exact();
+                let place = Place::find(bad, |x| q.order_by(side, |f| f.value(exact).signum(), x));
+                prop_assert_eq!(q.nearest::<f64>(side), place.to_f64());
+                prop_assert_eq!(q.nearest::<f32>(side), place.to_f32());
+            }
+        }
+
+        /// Roots ascend, and between them the form has the other sign.
+        #[test]
+        fn roots_are_where_the_sign_changes(c in [coefficient(), coefficient(), coefficient()], x in coefficient()) {
+            let q = Quadratic::new(Plain(c));
+            let exact = c.map(Dyadic::new);
+            let value = at(2, &exact, &Dyadic::new(x), &Dyadic::new(1.0)).signum();
+            match q.count() {
+                Count::None => prop_assert!(c[0] == 0.0 && c[1] == 0.0 || value == q.leading() && value != 0),
+                Count::Simple => {
+                    prop_assert_eq!(q.order(Side::Lower, x.into()).is_eq(), value == 0);
+                    prop_assert_eq!(q.order(Side::Lower, x.into()).is_lt(), value * q.slope() > 0);
+                }
+                Count::Double => prop_assert_eq!(q.order(Side::Lower, x.into()).is_eq(), value == 0),
+                Count::Two => {
+                    let (lower, upper) = (q.order(Side::Lower, x.into()), q.order(Side::Upper, x.into()));
+                    prop_assert!(lower <= upper);
+                    prop_assert_eq!(lower.is_lt() && upper.is_gt(), value * q.leading() < 0);
+                    prop_assert_eq!(lower.is_eq() || upper.is_eq(), value == 0);
+                }
+            }
+        }
+
+        #[test]
+        fn fractions_are_ordered(x in [-9..9i32, -9..9, -9..9i32], y in [-9..9i32, -9..9, -9..9i32], e in -400..400i32) {
+            prop_assume!(x[2] != 0 && y[2] != 0);
+            let s = 2f64.powi(e);
+            let of = |[a, b, c]: [i32; 3]| Fraction::new(f64::from(a) * s, f64::from(b) * s, c.into());
+            let (left, right) = ((x[0] - x[1]) * y[2], (y[0] - y[1]) * x[2]);
+            let expected = if x[2] * y[2] > 0 { left.cmp(&right) } else { right.cmp(&left) };
+            prop_assert_eq!(of(x).order(of(y), &mut false), expected);
+        }
+    }
+
+    #[test]
+    fn ordinary_roots_need_no_exact_numbers() {
+        let q = Quadratic::new(Plain([0.3, -0.7, 0.1]));
+        assert_eq!(q.count(), Count::Two);
+        let [x, y] = [Side::Lower, Side::Upper].map(|side| q.nearest::<f64>(side));
+        assert!((x * y - 1.0 / 3.0).abs() < 1e-15 && !q.fallback());
+        // A double root that no float has exactly: 0.1^2 is not the float nearest to it.
+        assert_eq!(Quadratic::new(Plain([1.0, -0.1, 0.1 * 0.1])).count(), Count::None);
+        assert_eq!(Quadratic::new(Plain([1.0, -0.5, 0.25])).count(), Count::Double);
+    }
+
+    #[test]
+    fn ends_of_the_range_are_rounded_as_ieee_says() {
+        let root = |x: f64, scale: f64| Quadratic::new(Plain([0.0, scale, -2.0 * x])).nearest::<f64>(Side::Lower);
+        // x / scale
+        assert_eq!(root(f64::MAX / 2.0, 0.5), f64::MAX);
+        assert_eq!(root(f64::MAX / 2.0, 0.25), f64::INFINITY);
+        assert_eq!(root(-f64::MAX / 2.0, 0.25), f64::NEG_INFINITY);
+        assert_eq!(root(f64::from_bits(3), 2.0), f64::from_bits(2));
+        assert_eq!(root(f64::from_bits(1), 2.0), 0.0);
+    }
+}
