@@ -1,6 +1,10 @@
 //! Triangle tests by tier, in an object's normalised space.
 
-use firsthit_geometry::triangle::{self, Shear};
+use firsthit_geometry::{
+    Ray,
+    exact::ExactRay,
+    triangle::{self, Shear},
+};
 use glam::{DVec3, Vec3};
 
 use crate::local::LocalRay;
@@ -18,7 +22,23 @@ pub(crate) fn double(v: &[Vec3; 3]) -> [DVec3; 3] {
     [v[0].as_dvec3(), v[1].as_dvec3(), v[2].as_dvec3()]
 }
 
-/// How a tier meets boxes and triangles. `t` is local and counted from the ray's true origin.
+/// What a triangle test finds. `t` is local and counted from the ray's true origin; any `t`.
+pub(crate) struct Found {
+    pub(crate) t: f64,
+    pub(crate) u: f32,
+    pub(crate) v: f32,
+    /// `f64` could not decide.
+    pub(crate) fallback: bool,
+}
+
+impl Found {
+    #[inline(always)]
+    fn new(t: f64, u: f32, v: f32) -> Self {
+        Self { t, u, v, fallback: false }
+    }
+}
+
+/// How a tier meets boxes and triangles.
 pub(crate) trait Kernel {
     /// Boxes are met as if larger by all that is rounded, so that none with a hit is missed.
     const PADDED: bool;
@@ -27,12 +47,12 @@ pub(crate) trait Kernel {
     /// What is prepared once per ray and instance.
     type Setup;
     fn setup(ray: &LocalRay) -> Self::Setup;
-    /// `t`, `u`, `v`; any `t`.
-    fn test(setup: &Self::Setup, ray: &LocalRay, vertices: &[Vec3; 3]) -> Option<(f64, f32, f32)>;
+    /// The hit, if there is one; beyond `t_max` it is not wanted, but may be given.
+    fn test(setup: &Self::Setup, ray: &LocalRay, vertices: &[Vec3; 3], t_max: f64) -> Option<Found>;
     /// The same if the triangle answers for the crossing, see [`crate::Crossings::Surfaces`].
     #[inline(always)]
-    fn crosses(setup: &Self::Setup, ray: &LocalRay, vertices: &[Vec3; 3]) -> Option<(f64, f32, f32)> {
-        Self::test(setup, ray, vertices)
+    fn crosses(setup: &Self::Setup, ray: &LocalRay, vertices: &[Vec3; 3], t_max: f64) -> Option<Found> {
+        Self::test(setup, ray, vertices, t_max)
     }
 }
 
@@ -48,9 +68,9 @@ impl Kernel for Fast {
     fn setup(_: &LocalRay) {}
 
     #[inline(always)]
-    fn test((): &(), ray: &LocalRay, vertices: &[Vec3; 3]) -> Option<(f64, f32, f32)> {
+    fn test((): &(), ray: &LocalRay, vertices: &[Vec3; 3], _: f64) -> Option<Found> {
         let hit = triangle::moeller_trumbore::<f32>(*vertices, ray.origin32, ray.direction32)?;
-        Some((f64::from(hit.t) + ray.shift, hit.u, hit.v))
+        Some(Found::new(f64::from(hit.t) + ray.shift, hit.u, hit.v))
     }
 }
 
@@ -71,10 +91,10 @@ impl<const PADDING: bool, const WATERTIGHT: bool, const FALLBACK: bool, const PL
     }
 
     #[inline(always)]
-    fn test(shear: &Shear<f32>, ray: &LocalRay, vertices: &[Vec3; 3]) -> Option<(f64, f32, f32)> {
+    fn test(shear: &Shear<f32>, ray: &LocalRay, vertices: &[Vec3; 3], t_max: f64) -> Option<Found> {
         if !WATERTIGHT {
-            let (t, u, v) = Fast::test(&(), ray, vertices)?;
-            return Some((if PLANE_T { plane(vertices, ray)? } else { t }, u, v));
+            let hit = Fast::test(&(), ray, vertices, t_max)?;
+            return Some(if PLANE_T { Found { t: plane(vertices, ray)?, ..hit } } else { hit });
         }
         let relative = relative(vertices, ray.origin32);
         let w = if FALLBACK { shear.weights(relative) } else { shear.weights_unguarded(relative) }?;
@@ -87,16 +107,16 @@ impl<const PADDING: bool, const WATERTIGHT: bool, const FALLBACK: bool, const PL
             let t = ((1.0 - w.u - w.v) * a + w.u * b + w.v * c) / ray.direction32[axis];
             f64::from(t) + ray.shift
         };
-        Some((t, w.u, w.v))
+        Some(Found::new(t, w.u, w.v))
     }
 
     #[inline(always)]
-    fn crosses(shear: &Shear<f32>, ray: &LocalRay, vertices: &[Vec3; 3]) -> Option<(f64, f32, f32)> {
+    fn crosses(shear: &Shear<f32>, ray: &LocalRay, vertices: &[Vec3; 3], t_max: f64) -> Option<Found> {
         if !WATERTIGHT {
-            return Self::test(shear, ray, vertices);
+            return Self::test(shear, ray, vertices, t_max);
         }
         let w = shear.crosses(relative(vertices, ray.origin32))?;
-        Some((crossing(vertices, ray, f64::from(w.u), f64::from(w.v)), w.u, w.v))
+        Some(Found::new(crossing(vertices, ray, f64::from(w.u), f64::from(w.v)), w.u, w.v))
     }
 }
 
@@ -131,16 +151,49 @@ impl Kernel for Double {
     }
 
     #[inline(always)]
-    fn test(setup: &Shear<f64>, ray: &LocalRay, vertices: &[Vec3; 3]) -> Option<(f64, f32, f32)> {
+    fn test(setup: &Shear<f64>, ray: &LocalRay, vertices: &[Vec3; 3], _: f64) -> Option<Found> {
         let [a, b, c] = double(vertices);
         let w = setup.weights([a - ray.origin, b - ray.origin, c - ray.origin])?;
-        Some((plane(vertices, ray)?, w.u as f32, w.v as f32))
+        Some(Found::new(plane(vertices, ray)?, w.u as f32, w.v as f32))
     }
 
     #[inline(always)]
-    fn crosses(setup: &Shear<f64>, ray: &LocalRay, vertices: &[Vec3; 3]) -> Option<(f64, f32, f32)> {
+    fn crosses(setup: &Shear<f64>, ray: &LocalRay, vertices: &[Vec3; 3], _: f64) -> Option<Found> {
         let [a, b, c] = double(vertices);
         let w = setup.crosses([a - ray.origin, b - ray.origin, c - ray.origin])?;
-        Some((crossing(vertices, ray, w.u, w.v), w.u as f32, w.v as f32))
+        Some(Found::new(crossing(vertices, ray, w.u, w.v), w.u as f32, w.v as f32))
+    }
+}
+
+/// Tier `Exact`: exact decisions for the unrounded ray in the instance's own space.
+///
+/// Boxes are padded as for the other tiers, hits are not kept within them: `t` stays correctly rounded. No box is missed
+/// all the same. An exact hit is a point of the exact line in the triangle's `f32` box, which is exact; the ray of the
+/// box test is off that line by less than the boxes are widened ([`LocalRay::slabs`]), and the ends of its interval
+/// leave room for the rounding of `t` ([`LocalRay::box_t_max`]).
+pub(crate) struct Exact;
+
+impl Kernel for Exact {
+    const PADDED: bool = true;
+    const CLAMPED: bool = false;
+    type Setup = Option<ExactRay>;
+
+    #[inline(always)]
+    fn setup(ray: &LocalRay) -> Option<ExactRay> {
+        let [t_min, t_max] = ray.interval;
+        let exact = ExactRay::new(Ray { origin: ray.origin, direction: ray.direction, t_min, t_max })?;
+        Some(if ray.shift == 0.0 { exact } else { exact.near(ray.shift) })
+    }
+
+    #[inline(always)]
+    fn test(setup: &Option<ExactRay>, _: &LocalRay, vertices: &[Vec3; 3], t_max: f64) -> Option<Found> {
+        let hit = setup.as_ref()?.hit_before(double(vertices), t_max)?;
+        Some(Found { t: hit.t, u: hit.u as f32, v: hit.v as f32, fallback: hit.fallback })
+    }
+
+    #[inline(always)]
+    fn crosses(setup: &Option<ExactRay>, _: &LocalRay, vertices: &[Vec3; 3], t_max: f64) -> Option<Found> {
+        let hit = setup.as_ref()?.hit_before(double(vertices), t_max).filter(|h| h.crosses)?;
+        Some(Found { t: hit.t, u: hit.u as f32, v: hit.v as f32, fallback: hit.fallback })
     }
 }

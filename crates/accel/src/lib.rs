@@ -36,6 +36,8 @@ mod kernel;
 mod layout;
 mod local;
 mod model;
+mod normalise;
+mod order;
 mod query;
 pub mod reference;
 mod scene;

@@ -10,13 +10,13 @@
 //! * the watertight test decides for a triangle whose vertices are off by at most 6 uR: rounding of `v - o` (u|v - o|
 //!   in two axes), of the shear (u), of its product (u) and of the difference (u(|x| + |z|)).
 //!
-//! So a triangle that the `f32` test accepts lies within `u|o| + 8uR` of the exact ray ([`LocalRay::reach`]), and boxes
-//! that are met as if they were larger by a little more than that contain every hit: the answer is that of testing all
+//! So a triangle that the `f32` test accepts lies within `u|o| + 8uR` of the exact ray ([`LocalRay::reach`]; a little
+//! more where moving the origin was rounded), and boxes that are met as if they were larger by a little more than that contain every hit: the answer is that of testing all
 //! triangles, whatever the tree.
 //!
 //! Setups that not every tier needs (of the box test, of a triangle test) are made by those who need them.
 
-use firsthit_geometry::{Aabb, Ray, Real, slab::Slabs, transform::Transform};
+use firsthit_geometry::{Aabb, Precision, Ray, Real, slab::Slabs, transform::Transform, triangle::Shear};
 use glam::{DVec3, Vec3};
 
 /// Unit roundoff of `f32`.
@@ -66,7 +66,11 @@ pub(crate) struct LocalRay {
     pub(crate) t_scale: f64,
     /// The moved origin is `origin + shift * direction`, and its parameter counts from there.
     pub(crate) shift: f64,
+    /// The ray's interval in this space's parameter.
+    pub(crate) interval: [f64; 2],
     moved: DVec3,
+    /// How far moving may have rounded the origin off the line, in each axis.
+    off: f64,
     /// Largest coordinate difference between the moved origin and the object.
     farthest: f64,
     /// The moved origin in single precision.
@@ -88,21 +92,25 @@ impl LocalRay {
             return None;
         }
         let relative = origin - center;
-        let mut shift = 0.0;
+        let (mut shift, mut off) = (0.0, 0.0);
         if relative.abs().max_element() > FAR * half {
             // From the point nearest to the centre back by the size of the box, which is more than half its diagonal.
             shift = -relative.dot(direction) / direction.dot(direction) - 2.0 * half;
+            // Components of the direction are below 2. The f64 tests see the object from the true origin, with some more
+            // roundings of the same size.
+            off = shift.abs() * (32.0 * f64::UNIT_ROUNDOFF);
         }
         let moved = origin + direction * shift;
+        let interval = [ray.t_min * length, ray.t_max * length];
         let farthest = (moved - center).abs().max_element() + half;
         let (origin32, direction32) = (moved.as_vec3(), direction.as_vec3());
-        Some(Self { origin, direction, t_scale: length, shift, moved, farthest, origin32, direction32 })
+        Some(Self { origin, direction, t_scale: length, shift, interval, moved, off, farthest, origin32, direction32 })
     }
 
     /// How far from the ray, in each axis, a primitive may lie that the tests accept.
     #[inline]
     pub(crate) fn reach(&self) -> DVec3 {
-        self.moved.abs() * U + 8.0 * U * self.farthest
+        self.moved.abs() * U + (8.0 * U * self.farthest + self.off)
     }
 
     /// Setup of the box test: plain, or `PADDED` so that boxes are met as if larger by more than [`LocalRay::reach`].
@@ -113,7 +121,7 @@ impl LocalRay {
             return slabs;
         }
         // Two more u|o| for rounding the origin and adding `delta` to it; 2uR to be above `reach` whatever rounds.
-        slabs.widened((self.moved.abs() * (3.0 * U) + (10.0 * U * self.farthest + TINY)).as_vec3())
+        slabs.widened((self.moved.abs() * (3.0 * U) + (10.0 * U * self.farthest + self.off + TINY)).as_vec3())
     }
 
     /// A parameter of the world's ray as the start of the box tests' interval: not above it.
@@ -136,6 +144,29 @@ impl LocalRay {
         // Entry into a box has four roundings in f32 (and one more is made here), `local` and `t` have a few in f64.
         let error = local.abs() * (16.0 * U) + (t.abs() + self.shift.abs()) * (16.0 * f64::UNIT_ROUNDOFF);
         (local + side * error).to_f32()
+    }
+
+    /// Whether an edge function of the triangle is so small that what the tier rounds may have decided its sign.
+    pub(crate) fn near_edge(&self, vertices: [DVec3; 3], precision: Precision) -> bool {
+        // By how much vertices are off, seen from the ray.
+        let (origin, off) = match precision {
+            // Moeller and Trumbore's test rounds otherwise, but no less.
+            Precision::Fast | Precision::Robust => (self.moved, self.reach().max_element()),
+            Precision::Double => {
+                let farthest = vertices.iter().fold(0.0f64, |m, v| m.max((*v - self.origin).abs().max_element()));
+                (self.origin, 8.0 * f64::UNIT_ROUNDOFF * farthest)
+            }
+            Precision::Exact => return false,
+        };
+        // The shear adds one coordinate to another.
+        let off = 2.0 * off;
+        let shear = Shear::<f64>::new(self.direction);
+        let p = vertices.map(|v| shear.apply(v - origin));
+        [(0, 1), (1, 2), (2, 0)].into_iter().any(|(i, j)| {
+            let ((ax, ay), (bx, by)) = (p[i], p[j]);
+            let size = ax.abs() + ay.abs() + bx.abs() + by.abs();
+            !((bx * ay - by * ax).abs() > off * (size + 2.0 * off))
+        })
     }
 
     /// Raises `t` (local, counted from the true origin) to where the ray enters the primitive's own box, and lowers it

@@ -1,14 +1,16 @@
 //! One mesh with its tree, in normalised `f32` space.
 
 use core::ops::{ControlFlow, Range};
+use std::borrow::Cow;
 
 use firsthit_geometry::{Aabb, Precision, Primitive, Ray, Real, Shape, SurfaceHit, triangle};
 use glam::{DVec3, Vec3};
 
 use crate::build::Topology;
-use crate::kernel::{Kernel, double};
+use crate::kernel::{Found, Kernel, double};
 use crate::layout::Bvh2;
 use crate::local::{Extent, LocalRay};
+use crate::normalise::common_scale;
 use crate::query::{Candidate, Collector};
 use crate::stats::Probe;
 use crate::traverse::traverse;
@@ -75,7 +77,7 @@ impl Model {
     /// Checks and builds mesh number `mesh`.
     pub(crate) fn new(mesh: usize, geometries: &[Geometry], options: BuildOptions) -> Result<Self, BuildError> {
         check(mesh, geometries)?;
-        let scale = common_scale(geometries);
+        let scale = common_scale(geometries, options.precision);
         let normalised = |p: Vec3| (p.as_dvec3() / scale).as_vec3();
 
         let mut model = Self {
@@ -135,7 +137,7 @@ impl Model {
         }
         model.bounds = boxes.iter().fold(Aabb::empty(), |a, b| a.union(*b)).to_f64();
         model.extent = Extent::new(&model.bounds);
-        let topology = Topology::new(&boxes, options.quality);
+        let topology = Topology::new(&near_one(&boxes, &model.bounds), options.quality);
         model.tree = Bvh2::new(&topology, &boxes);
         model.depth = topology.depth();
         model.triangles = topology.order.iter().map(|&i| triangles[i as usize]).collect();
@@ -249,27 +251,32 @@ impl Model {
         let t_min = ray.box_t_min(collector.t_min());
         let t_max = ray.box_t_max(collector.t_max());
         let mut end = t_max;
+        let mut limit = collector.t_max() * ray.t_scale;
         let leaf = |range: Range<usize>, probe: &mut P| {
             let mut taken = false;
             for place in range {
                 probe.primitive();
                 if SHAPES && let Some(Places::Shape(index)) = self.places.get(self.ids[place].geometry as usize) {
                     taken |= self.offer_shape::<C>(*index, ray, instance, precision, K::CLAMPED, collector)?;
-                } else if let Some((t, u, v)) = if SURFACES {
-                    K::crosses(&setup, ray, &self.triangles[place])
-                } else {
-                    K::test(&setup, ray, &self.triangles[place])
-                } {
-                    let t = if K::CLAMPED { within_triangle(ray, t, &self.triangles[place]) } else { Some(t) };
-                    if let Some(t) = t {
-                        let PrimitiveId { geometry, primitive } = self.ids[place];
-                        let t = t / ray.t_scale;
-                        taken |= collector.offer(Candidate::new(instance, geometry, primitive, t, u, v))?;
-                    }
+                    continue;
                 }
+                let found = if SURFACES {
+                    K::crosses(&setup, ray, &self.triangles[place], limit)
+                } else {
+                    K::test(&setup, ray, &self.triangles[place], limit)
+                };
+                let Some(Found { t, u, v, fallback }) = found else { continue };
+                if fallback {
+                    probe.fallback();
+                }
+                let t = if K::CLAMPED { within_triangle(ray, t, &self.triangles[place]) } else { Some(t) };
+                let Some(t) = t else { continue };
+                let PrimitiveId { geometry, primitive } = self.ids[place];
+                taken |= collector.offer(Candidate::new(instance, geometry, primitive, t / ray.t_scale, u, v))?;
             }
             if taken {
                 end = ray.box_t_max(collector.t_max());
+                limit = collector.t_max() * ray.t_scale;
             }
             ControlFlow::Continue(end)
         };
@@ -354,29 +361,18 @@ fn within_triangle(ray: &LocalRay, t: f64, vertices: &[Vec3; 3]) -> Option<f64> 
 fn shape_hit(shape: &Shape<f64>, ray: &Ray<f64>, precision: Precision) -> Option<SurfaceHit<f64>> {
     match precision {
         Precision::Fast => shape.closest_hit_fast(ray),
-        Precision::Robust | Precision::Double => shape.closest_hit(ray),
+        Precision::Robust | Precision::Double | Precision::Exact => shape.closest_hit(ray),
     }
 }
 
-/// The power of two below the largest coordinate of a mesh: divided by it, products of three coordinates stay far from
-/// overflow and underflow, and no digit changes.
-fn common_scale(geometries: &[Geometry]) -> f64 {
-    let mut largest = 0.0f64;
-    for geometry in geometries {
-        match geometry {
-            Geometry::Triangles { positions, .. } => {
-                let m = positions.iter().fold(Vec3::ZERO, |m, p| m.max(p.abs()));
-                largest = largest.max(f64::from(m.max_element()));
-            }
-            Geometry::Shape(shape) => {
-                let b = shape.bounds();
-                if b.is_finite() {
-                    largest = largest.max(b.min.abs().max(b.max.abs()).max_element());
-                }
-            }
-        }
+/// Boxes for the builder, whose areas must not overflow: only the shape of the tree comes from them.
+fn near_one<'a>(boxes: &'a [Aabb<f32>], bounds: &Aabb<f64>) -> Cow<'a, [Aabb<f32>]> {
+    let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
+    if boxes.is_empty() || largest < 4.0 {
+        return boxes.into();
     }
-    largest.power_of_two_below()
+    let k = (1.0 / largest.power_of_two_below()) as f32;
+    boxes.iter().map(|b| Aabb::new(b.min * k, b.max * k)).collect()
 }
 
 /// Everything finite, in range and countable.

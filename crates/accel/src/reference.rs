@@ -5,6 +5,7 @@
 
 use firsthit_geometry::{
     Primitive, Ray,
+    exact::ExactRay,
     triangle::{self, Shear},
 };
 use glam::DVec3;
@@ -62,6 +63,33 @@ pub fn crossings(scene: &Scene, ray: &Ray<f64>, what: Crossings) -> Vec<Hit> {
     }
     hits.sort_by(|a, b| a.t.total_cmp(&b.t).then(a.id.cmp(&b.id)));
     hits
+}
+
+/// All hits of triangles in the ray's closed interval, decided exactly in each instance's own space, for the ray as
+/// rounded there: `t` correctly rounded, in exact order within an instance. Shapes are left out.
+///
+/// At [`Precision::Exact`](firsthit_geometry::Precision::Exact) the scene answers the same, bit for bit.
+#[must_use]
+pub fn exact_crossings(scene: &Scene, ray: &Ray<f64>, what: Crossings) -> Vec<Hit> {
+    let mut hits = Vec::new();
+    for (i, instance) in scene.instances().iter().enumerate() {
+        let Some(model) = scene.models().get(instance.model as usize) else { continue };
+        let Some(local) = ExactRay::new(instance.transform.ray_to_object(ray)) else { continue };
+        for (id, surface) in model.surfaces() {
+            let Surface::Triangle(v) = surface else { continue };
+            if let Some(h) = local.hit(v).filter(|h| h.crosses || what == Crossings::Triangles) {
+                let id = HitId { instance: i as u32, geometry: id.geometry, primitive: id.primitive };
+                let normal = triangle::normal(v).map_or(DVec3::ZERO, |n| instance.transform.normal(n));
+                hits.push((h, Hit { id, t: h.t, u: h.u as f32, v: h.v as f32, normal }));
+            }
+        }
+        // Sorting is stable: across instances the rounded t decides, then the instance.
+        let of_instance = |(_, hit): &(_, Hit)| hit.id.instance == i as u32;
+        let start = hits.partition_point(|h| !of_instance(h));
+        hits[start..].sort_by(|(x, a), (y, b)| local.order(x, y).then(a.id.cmp(&b.id)));
+    }
+    hits.sort_by(|(_, a), (_, b)| a.t.total_cmp(&b.t));
+    hits.into_iter().map(|(_, hit)| hit).collect()
 }
 
 /// The nearest hit, of equally near ones the smallest id.

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use crate::build::Topology;
 use crate::instance::{Instance, tight_boxes};
-use crate::kernel::{Double, Fast, Kernel, Robust};
+use crate::kernel::{Double, Exact, Fast, Kernel, Robust};
 use crate::layout::{Bvh2, Tree};
 use crate::local::LocalRay;
 use crate::model::{Model, PrimitiveId, Surface, limit};
@@ -180,7 +180,9 @@ impl Scene {
         accept: impl FnMut(&Hit) -> bool,
         probe: &mut P,
     ) -> Option<Hit> {
-        let mut closest = Closest { t_min: ray.t_min, t_max: ray.t_max, source: self.flat(source), accept, best: None };
+        let order = |a: &Hit, b: &Hit| self.order(ray, a, b);
+        let (t_min, t_max) = (ray.t_min, ray.t_max);
+        let mut closest = Closest { t_min, t_max, source: self.flat(source), accept, order, best: None };
         // It never breaks: the nearest hit is known at the end only.
         let _ = self.inner.trace::<STATIC, false, _, _>(ray, &mut closest, probe);
         closest.best.map(|hit| Hit { normal: self.world_normal(&hit), ..hit })
@@ -254,6 +256,7 @@ impl Inner {
                 self.trace_guarded::<SURFACES, _, _>(ray, collector as &mut (dyn Collector + '_), probe)
             }
             Precision::Double => self.trace_by::<SURFACES, Double, C, P>(ray, collector, probe),
+            Precision::Exact => self.trace_by::<SURFACES, Exact, C, P>(ray, collector, probe),
         }
     }
 

@@ -14,6 +14,9 @@ pub(crate) trait Probe {
     /// A primitive was tested.
     #[inline(always)]
     fn primitive(&mut self) {}
+    /// A hit needed more than `f64`.
+    #[inline(always)]
+    fn fallback(&mut self) {}
 }
 
 /// Watches nothing.
@@ -28,6 +31,10 @@ impl Probe for TraversalCounts {
     #[inline(always)]
     fn primitive(&mut self) {
         self.primitives = self.primitives.saturating_add(1);
+    }
+    #[inline(always)]
+    fn fallback(&mut self) {
+        self.fallbacks = self.fallbacks.saturating_add(1);
     }
 }
 

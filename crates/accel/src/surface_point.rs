@@ -52,7 +52,7 @@ fn on_triangle(v: [DVec3; 3], hit: &Hit, precision: Precision) -> (DVec3, DVec3)
         // The test works on vertices relative to a rounded origin, in f32.
         Precision::Fast => magnitude * (8.0 * f64::from(f32::UNIT_ROUNDOFF)),
         // The test's distance comes from the plane in f64, whose normal tilts by some roundings times the aspect.
-        Precision::Robust | Precision::Double => {
+        Precision::Robust | Precision::Double | Precision::Exact => {
             let e3 = e2 - e1;
             let (a, b, c) = (e1.length(), e2.length(), e3.length());
             let longest = a.max(b).max(c);

@@ -9,6 +9,7 @@ use core::{fmt, str::FromStr};
 /// | `Fast` | f32, shortest formulas (Moeller-Trumbore, algebraic quadratic) | no panic, no NaN; may leak at shared edges and vertices |
 /// | `Robust` | f32 in stable forms, f64 where an edge function is zero, padded boxes | no leak through a closed mesh; right wherever f32 leaves 64 units of margin |
 /// | `Double` | f64 | right wherever f64 leaves that margin |
+/// | `Exact` | f64 with a proven bound, exact numbers where it cannot tell | hit or miss, order and parity exact; `t` correctly rounded |
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Precision {
     /// Shortest f32 formulas.
@@ -18,10 +19,13 @@ pub enum Precision {
     Robust,
     /// f64 at the primitives.
     Double,
+    /// Exact decisions for the input as it is.
+    Exact,
 }
 
 impl Precision {
-    /// All tiers, from the cheapest to the most careful.
+    /// All tiers, from the cheapest to the most careful; but for `Exact`, as long as analytic shapes have no exact
+    /// form.
     pub const ALL: [Self; 3] = [Self::Fast, Self::Robust, Self::Double];
 
     /// The name used on command lines and in reports.
@@ -31,6 +35,7 @@ impl Precision {
             Self::Fast => "fast",
             Self::Robust => "robust",
             Self::Double => "double",
+            Self::Exact => "exact",
         }
     }
 }

@@ -5,7 +5,7 @@ use firsthit_geometry::{Precision, Ray};
 use firsthit_tests::oracle::{Aim, Mesh, Rng, grid_cube, icosphere, read_obj, torus};
 use glam::{DAffine3, DQuat, DVec3};
 
-use crate::scene_of;
+use crate::{careful, scene_of};
 
 /// Rays that hit nothing, of `count` for each aim, from points near `inside` in the mesh's own space.
 fn leaks(
@@ -67,7 +67,7 @@ fn closed_meshes_do_not_leak_at_any_scale_and_place() {
     ];
     for (mesh, inside) in &meshes {
         for &place in &places {
-            for precision in [Precision::Robust, Precision::Double] {
+            for precision in careful() {
                 let scene = scene_of(mesh, place, precision);
                 let lost = leaks(&scene, mesh, place, inside, 10_000);
                 assert_eq!(lost, [0; 3], "{precision}, {place:?}: lost at vertices, edges, faces");
@@ -81,7 +81,7 @@ fn closed_meshes_do_not_leak_at_any_scale_and_place() {
 fn baked_meshes_do_not_leak() {
     for (scale, offset) in [(1e-6, 0.0), (1.0, 1e3), (1.0, 1e4), (3e5, 0.0), (1e30, 0.0), (1e-30, 0.0)] {
         let mesh = icosphere(4).map(|p| p * scale + offset);
-        for precision in [Precision::Robust, Precision::Double] {
+        for precision in careful() {
             let scene = scene_of(&mesh, DAffine3::IDENTITY, precision);
             let inside = |rng: &mut Rng| near_middle(rng) * f64::from(scale) + f64::from(offset);
             assert_eq!(
@@ -98,7 +98,7 @@ fn baked_meshes_do_not_leak() {
 fn axis_parallel_rays_on_a_grid_do_not_leak() {
     let n = 16;
     let mesh = grid_cube(n);
-    for precision in [Precision::Robust, Precision::Double] {
+    for precision in careful() {
         let scene = scene_of(&mesh, DAffine3::IDENTITY, precision);
         for axis in 0..3 {
             for side in [-1.0, 1.0] {
@@ -141,7 +141,7 @@ fn scanned_meshes_do_not_leak() {
     for (name, inside) in [("spot/spot.obj", DVec3::new(0.0, 0.0, 0.1)), ("armadillo/armadillo.obj", DVec3::ZERO)] {
         let mesh = read_obj(&shared.join("assets").join(name)).expect(name);
         let size = mesh.positions.iter().fold(0.0f32, |m, p| m.max(p.abs().max_element()));
-        for precision in [Precision::Robust, Precision::Double] {
+        for precision in careful() {
             let scene = scene_of(&mesh, DAffine3::IDENTITY, precision);
             let inside = |rng: &mut Rng| inside + rng.in_cube() * 0.02 * f64::from(size);
             assert_eq!(leaks(&scene, &mesh, DAffine3::IDENTITY, inside, 20_000), [0; 3], "{name} {precision}");

@@ -1,6 +1,5 @@
 //! Every hit.
 
-use core::cmp::Ordering;
 use core::ops::ControlFlow;
 
 use firsthit_geometry::Ray;
@@ -92,11 +91,13 @@ impl HitLists {
 }
 
 impl Scene {
-    /// Every hit in the ray's closed interval, sorted by `t`, then by id; none for an invalid ray. Of a shape, every
+    /// Every hit in the ray's closed interval, sorted by `t`, then by id (at `Exact` first by the exact order, where
+    /// triangles of one instance have the same rounded `t`); none for an invalid ray. Of a shape, every
     /// root.
     ///
     /// What counts where the ray passes through an edge is up to `crossings`. With [`Crossings::Triangles`] the first is
-    /// [`Scene::closest_hit`], and a ray that starts at a hit's `t` finds it and its equals again.
+    /// [`Scene::closest_hit`], and a ray that starts at a hit's `t` finds it and its equals again (at `Exact`, where
+    /// the interval is compared with the exact `t` before that is rounded, one that starts at `t.next_down()`).
     ///
     /// ```
     /// use firsthit_accel::{Crossings, Geometry, SceneBuilder};
@@ -143,7 +144,7 @@ impl Scene {
         // It never breaks.
         let _ = self.cross(ray, crossings, &mut all, &mut Off);
         let hits = all.hits;
-        hits.sort_by(by_place);
+        hits.sort_by(|a, b| self.order(ray, a, b));
         for hit in hits {
             hit.normal = self.world_normal(hit);
         }
@@ -169,8 +170,4 @@ impl Scene {
         chunks.iter().for_each(|c| lists.append(c));
         lists
     }
-}
-
-fn by_place(a: &Hit, b: &Hit) -> Ordering {
-    a.t.total_cmp(&b.t).then(a.id.cmp(&b.id))
 }

@@ -6,6 +6,7 @@ mod batch;
 mod closest_hit;
 mod count_hits;
 mod crossings;
+mod edge_decided;
 
 use core::ops::ControlFlow;
 

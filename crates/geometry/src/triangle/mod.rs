@@ -12,7 +12,7 @@ pub use watertight::{Shear, Weights, watertight};
 
 use glam::DVec3;
 
-use crate::{Precision, Ray, Real, Vector3};
+use crate::{Precision, Ray, Real, Vector3, exact::ExactRay};
 
 /// Where a ray meets a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,6 +30,7 @@ pub struct TriangleHit<R: Real> {
 /// * [`Precision::Fast`] is [`fast()`].
 /// * [`Precision::Robust`] is [`watertight()`] in `R`.
 /// * [`Precision::Double`] is [`watertight()`] in `f64` (to keep its digits, take `R = f64`).
+/// * [`Precision::Exact`] is [`ExactRay::hit`](crate::exact::ExactRay::hit), `t` rounded to `R` once.
 ///
 /// ```
 /// use firsthit_geometry::{Precision, Ray, triangle};
@@ -47,6 +48,13 @@ pub fn intersect<R: Real>(precision: Precision, vertices: [R::Vec3; 3], ray: &Ra
         Precision::Double => {
             let hit = watertight::<f64>(vertices.map(Vector3::to_f64), &ray.to_f64())?;
             Some(TriangleHit { t: R::from_f64(hit.t), u: R::from_f64(hit.u), v: R::from_f64(hit.v) })
+        }
+        Precision::Exact => {
+            let ray = ExactRay::new(ray.to_f64())?;
+            let hit = ray.hit(vertices.map(Vector3::to_f64))?;
+            let single = size_of::<R>() == size_of::<f32>();
+            let t = if single { R::from_f32(ray.t_f32(&hit)) } else { R::from_f64(hit.t) };
+            Some(TriangleHit { t, u: R::from_f64(hit.u), v: R::from_f64(hit.v) })
         }
     }
 }

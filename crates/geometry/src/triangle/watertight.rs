@@ -107,7 +107,7 @@ impl<R: Real> Shear<R> {
     /// use glam::DVec3;
     ///
     /// let [a, b, c, d] = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)].map(|(x, y)| DVec3::new(x, y, 5.0));
-    /// let down = Shear::new(DVec3::Z);
+    /// let down = Shear::<f64>::new(DVec3::Z);
     /// // Both halves of a square contain the point in the middle of their common edge; one is crossed there.
     /// assert!(down.weights([a, b, c]).is_some() && down.weights([a, c, d]).is_some());
     /// assert!(down.crosses([a, b, c]).is_some() != down.crosses([a, c, d]).is_some());

@@ -27,6 +27,7 @@ pub fn required(case: &Case, precision: Precision) -> bool {
         Precision::Fast => false,
         Precision::Robust => level == Level::F32 || never_missed(case),
         Precision::Double => level <= Level::F64 || never_missed(case),
+        Precision::Exact => true,
         #[allow(unreachable_patterns, reason = "as long as there is no more careful tier")]
         _ => true,
     }

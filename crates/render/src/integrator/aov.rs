@@ -123,7 +123,7 @@ mod tests {
 
     #[test]
     fn heat_grows_with_the_cost() {
-        let at = |boxes| heat(TraversalCounts { boxes, primitives: 0 });
+        let at = |boxes| heat(TraversalCounts { boxes, ..TraversalCounts::default() });
         assert_eq!(at(0), Vec3::ZERO);
         assert!((at(100_000) - Vec3::ONE).abs().max_element() < 1e-6);
     }
