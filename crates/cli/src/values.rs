@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use firsthit_import::srgb;
+use firsthit_measure::scenario::{self, Scenario};
 use firsthit_render::{Aov, CameraChoice, Crop, EffectOverrides, EffectSet, IntegratorChoice, ViewTransform};
 use glam::{DVec3, Vec3};
 
@@ -157,6 +158,24 @@ pub(crate) fn aovs(s: &str) -> Result<AovList, String> {
     Ok(AovList(list))
 }
 
+/// A scenario by its id, as `S1`.
+pub(crate) fn scenario(s: &str) -> Result<Scenario, String> {
+    let known = || scenario::ALL.map(|s| s.id).join(", ");
+    let found = scenario::ALL.into_iter().find(|known| known.id.eq_ignore_ascii_case(s.trim()));
+    found.ok_or_else(|| format!("unknown scenario; there are: {}", known()))
+}
+
+/// A whole number, also as `1e9`.
+pub(crate) fn count(s: &str) -> Result<u64, String> {
+    let wrong = || "expected a whole number from 0, as 1000000 or 1e6".to_owned();
+    if let Ok(n) = s.parse() {
+        return Ok(n);
+    }
+    let n: f64 = s.parse().map_err(|_| wrong())?;
+    // Up to here f64 has every whole number.
+    if (0.0..=9e15).contains(&n) && n.fract() == 0.0 { Ok(n as u64) } else { Err(wrong()) }
+}
+
 /// `auto`, `auto,-shadows,+ao`, `shadows,textures`, `none`.
 pub(crate) fn effects(s: &str) -> Result<EffectOverrides, String> {
     let mut overrides = EffectOverrides::default();
@@ -265,6 +284,14 @@ mod tests {
         assert_eq!(effects("none").map(|e| e.only), Ok(Some(EffectSet::empty())));
         assert!(effects("auto,shadows").unwrap_err().contains("+NAME"));
         assert!(effects("sparkles").unwrap_err().contains("punctual-lights"));
+    }
+
+    #[test]
+    fn counts_are_whole() {
+        assert_eq!(["1e9", "25", "18446744073709551615"].map(count), [Ok(1_000_000_000), Ok(25), Ok(u64::MAX)]);
+        assert!(["-1", "1.5", "1e20", "many", "nan"].iter().all(|s| count(s).is_err()));
+        assert_eq!(scenario("s15").map(|s| s.id), Ok("S15"));
+        assert!(scenario("S99").is_err_and(|e| e.contains("S1, S2")));
     }
 
     #[test]

@@ -159,3 +159,26 @@ fn what_cannot_be_measured_or_written_is_refused_in_time() {
         assert!(output.stdout.is_empty());
     }
 }
+
+#[test]
+fn scenarios_say_what_held_and_how_to_repeat_it() {
+    let folder = folder_with_model();
+    let run = |args: &[&str]| accuracy(folder.path(), &[&["--scenarios", "--quick"], args].concat());
+    let output = run(&["--only", "S1,s10", "--count", "2e5", "--json", "--seed", "5"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let report = json(&output);
+    let s1 = &report["scenarios"][0];
+    assert_eq!((&s1["id"], &s1["failures"], &s1["seed"]), (&"S1".into(), &0.into(), &5.into()));
+    assert!(s1["count"].as_u64().unwrap() > 190_000, "{s1}");
+    assert_eq!(report["scenarios"][1]["id"], "S10");
+
+    let text = stdout(&run(&["--only", "S1", "--count", "300000", "--from", "262144", "tetra.obj"]));
+    assert!(text.contains("passed") && text.contains("tetra.obj, fast"), "{text}");
+
+    std::fs::write(folder.path().join("open.obj"), MODEL.replace("f 2 3 4\n", "")).unwrap();
+    let open = run(&["open.obj"]);
+    assert_eq!(open.status.code(), Some(1));
+    assert!(stderr(&open).contains("not closed"), "{}", stderr(&open));
+    assert_eq!(run(&["--only", "S99"]).status.code(), Some(2));
+    assert_eq!(accuracy(folder.path(), &["--builtin", "--count", "5"]).status.code(), Some(2));
+}

@@ -5,12 +5,14 @@
 //!   [`workload`], timed by [`timing`], compared with the most careful tier by [`metric`].
 //! * [`result`] is what a measurement comes to: plain data, which [`report`] turns into charts and a page.
 //! * [`corpus`] runs exact hard cases through every engine at every tier.
+//! * [`scenario`] holds what must be so on whole meshes, in any size; [`flat`] is a ray caster of its own for that.
 //! * [`picture`] compares pictures.
 //! * [`mesh`] and [`random`] make input by rule.
 #![forbid(unsafe_code)]
 
 pub mod corpus;
 pub mod decision;
+pub mod flat;
 pub mod mesh;
 pub mod metric;
 pub mod picture;
@@ -18,6 +20,7 @@ pub mod random;
 pub mod report;
 pub mod result;
 mod run;
+pub mod scenario;
 mod shapes;
 pub mod subject;
 pub mod timing;

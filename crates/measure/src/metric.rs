@@ -1,6 +1,6 @@
 //! Errors of a tier against the most careful one.
 
-use firsthit_accel::{Hit, Scene};
+use firsthit_accel::{Crossings, Hit, Scene};
 use firsthit_geometry::error::difference_of_products;
 use firsthit_geometry::transform::Transform;
 use firsthit_geometry::{Ray, Real};
@@ -92,12 +92,9 @@ impl Errors {
             (Some(hit), None) => self.false_hits[level(subject, ray, hit)] += 1,
             (None, Some(first)) => {
                 // The clearest of all hits: none of them was found.
-                let (mut hit, mut clearest) = (Some(*first), Level::Exact as usize);
-                while let Some(h) = hit {
-                    clearest = clearest.min(level(subject, ray, &h));
-                    hit = exact.closest_hit(&ray.with_interval(h.t.next_up(), ray.t_max));
-                }
-                self.false_misses[clearest] += 1;
+                let all = exact.all_hits(ray, Crossings::Triangles);
+                let clearest = all.iter().chain([first]).map(|h| level(subject, ray, h)).min();
+                self.false_misses[clearest.unwrap_or(Level::Exact as usize)] += 1;
             }
             (Some(hit), Some(first)) => {
                 // One of several that are exactly nearest is as good as the first of them.

@@ -1,13 +1,15 @@
 //! One measurement: models, tiers and guards, ray sets; times and errors.
 
 use std::hint::black_box;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use firsthit_accel::{BuildError, BuildOptions, Guards, Hit, Scene, SceneBuilder};
 use firsthit_geometry::Precision;
-use firsthit_render::Monitor;
+use firsthit_render::{Monitor, RenderOptions};
 
 use crate::metric::{Errors, Truth, compare, lost_by_traversal};
+use crate::picture::{self, PictureError, PictureOptions};
 use crate::result::{Accuracy, Machine, Model, TierRow};
 use crate::shapes;
 use crate::subject::Subject;
@@ -57,7 +59,7 @@ impl Effort {
     fn budget(self) -> Duration {
         Duration::from_secs(match self {
             Self::Quick => 2,
-            Self::Normal => 16,
+            Self::Normal => 14,
             Self::Thorough => 180,
         })
     }
@@ -76,6 +78,8 @@ pub struct Options {
     pub rays: Vec<RayKind>,
     /// Whether to measure the analytic shapes too.
     pub shapes: bool,
+    /// Whether to render a picture of each model at each tier; never with [`Effort::Quick`].
+    pub pictures: bool,
 }
 
 impl Default for Options {
@@ -86,18 +90,31 @@ impl Default for Options {
             tiers: Precision::ALL.to_vec(),
             rays: RayKind::ALL.to_vec(),
             shapes: true,
+            pictures: true,
         }
     }
 }
 
 /// A model that cannot be measured.
 #[derive(Debug, thiserror::Error)]
-#[error("{model}: {error}")]
-pub struct MeasureError {
-    /// Its name.
-    pub model: String,
-    /// Why no trees can be built.
-    pub error: BuildError,
+#[non_exhaustive]
+pub enum MeasureError {
+    /// No trees can be built.
+    #[error("{model}: {error}")]
+    Build {
+        /// The model's name.
+        model: String,
+        /// Why.
+        error: BuildError,
+    },
+    /// It cannot be rendered.
+    #[error("{model}: {error}")]
+    Picture {
+        /// The model's name.
+        model: String,
+        /// Why.
+        error: PictureError,
+    },
 }
 
 /// Measures models. What `monitor` cancels is left out, and a note says so.
@@ -110,7 +127,7 @@ pub fn run(subjects: &[Subject], options: &Options, monitor: &dyn Monitor) -> Re
         options,
         monitor,
         done: 0,
-        total: (subjects.len() * (options.rays.len() * variants(options).len()) + usize::from(options.shapes)) as u64,
+        total: 0,
         rays: 0,
         accuracy: Accuracy {
             version: env!("CARGO_PKG_VERSION").into(),
@@ -121,8 +138,14 @@ pub fn run(subjects: &[Subject], options: &Options, monitor: &dyn Monitor) -> Re
         },
         noise: Vec::new(),
     };
+    let steps = options.rays.len() * variants(options).len() + usize::from(run.renders());
+    run.total = (subjects.len() * steps + usize::from(options.shapes)) as u64;
     for subject in subjects {
-        run.subject(subject).map_err(|error| MeasureError { model: subject.name.clone(), error })?;
+        let model = || subject.name.clone();
+        run.subject(subject).map_err(|error| MeasureError::Build { model: model(), error })?;
+        if run.renders() && !monitor.cancelled() {
+            run.pictures(subject).map_err(|error| MeasureError::Picture { model: model(), error })?;
+        }
     }
     if options.shapes && !monitor.cancelled() {
         let count = if options.effort == Effort::Quick { 500 } else { 4000 };
@@ -135,7 +158,7 @@ pub fn run(subjects: &[Subject], options: &Options, monitor: &dyn Monitor) -> Re
         model.verdict = verdict(&accuracy.tiers, &model.name);
     }
     if options.effort == Effort::Quick {
-        accuracy.notes.push("quick: the robust tier's guards were not measured one by one".into());
+        accuracy.notes.push("quick: no pictures, and the robust tier's guards were not measured one by one".into());
     }
     if monitor.cancelled() {
         accuracy.notes.push("interrupted: what was not measured yet is missing".into());
@@ -177,6 +200,15 @@ struct Run<'a> {
     accuracy: Accuracy,
     /// Relative spread of each timing.
     noise: Vec<f64>,
+}
+
+/// Passes on a wish to stop, but not the progress of each picture.
+struct Quiet<'a>(&'a dyn Monitor);
+
+impl Monitor for Quiet<'_> {
+    fn cancelled(&self) -> bool {
+        self.0.cancelled()
+    }
 }
 
 /// A ray set with what is right.
@@ -240,6 +272,28 @@ impl Run<'_> {
                 self.group(subject, asked, &best, &pair, std::slice::from_ref(guard), budget / guards.len() as u32);
             }
         }
+        Ok(())
+    }
+
+    fn renders(&self) -> bool {
+        self.options.pictures && self.options.effort != Effort::Quick
+    }
+
+    /// Renders the model at each tier.
+    fn pictures(&mut self, subject: &Subject) -> Result<(), PictureError> {
+        let (width, height, spp) = match self.options.effort {
+            Effort::Thorough => (640, 360, 4),
+            _ => (320, 180, 1),
+        };
+        let render = RenderOptions { width, height, spp, seed: self.options.seed, ..RenderOptions::default() };
+        let options = PictureOptions { tiers: self.options.tiers.clone(), render, ..PictureOptions::default() };
+        let scene = Arc::new(subject.desc.clone());
+        match picture::measure(&subject.name, &scene, &options, &Quiet(self.monitor)) {
+            Ok(rows) => self.accuracy.pictures.extend(rows),
+            Err(PictureError::Cancelled) => {}
+            Err(error) => return Err(error),
+        }
+        self.step(0);
         Ok(())
     }
 
@@ -352,7 +406,7 @@ mod tests {
 
     #[test]
     fn every_tier_and_kind_of_rays_has_a_row() {
-        let options = Options { effort: Effort::Quick, shapes: false, ..Options::default() };
+        let options = Options { effort: Effort::Quick, shapes: false, pictures: false, ..Options::default() };
         let accuracy = run(&[small()], &options, &()).unwrap();
         assert_eq!(accuracy.tiers.len(), Precision::ALL.len() * RayKind::ALL.len());
         for row in &accuracy.tiers {
@@ -369,7 +423,7 @@ mod tests {
     fn only_what_is_asked_for_is_measured() {
         let tiers = vec![Precision::Double];
         let rays = vec![RayKind::Shadow];
-        let options = Options { effort: Effort::Quick, tiers, rays, shapes: false, seed: 3 };
+        let options = Options { effort: Effort::Quick, tiers, rays, shapes: false, pictures: false, seed: 3 };
         let accuracy = run(&[small()], &options, &()).unwrap();
         assert_eq!(accuracy.tiers.len(), 1);
         assert_eq!((accuracy.tiers[0].tier.as_str(), accuracy.tiers[0].rays.as_str()), ("double", "shadow"));

@@ -3,7 +3,7 @@
 use core::fmt;
 use core::str::FromStr;
 
-use firsthit_accel::Scene;
+use firsthit_accel::{Crossings, Scene};
 use firsthit_geometry::Ray;
 use firsthit_render::framing::frame;
 use glam::DVec3;
@@ -176,18 +176,10 @@ pub fn interior_points(subject: &Subject, scene: &Scene, count: usize, rng: &mut
         })
         .collect();
     candidates.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let inside = |p: DVec3, rng: &mut Rng| (0..8).all(|_| crossings(scene, Ray::new(p, rng.direction())) % 2 == 1);
+    let inside = |p: DVec3, rng: &mut Rng| {
+        (0..8).all(|_| scene.count_hits(&Ray::new(p, rng.direction()), Crossings::Surfaces) % 2 == 1)
+    };
     candidates.into_iter().map(|c| c.1).filter(|&p| inside(p, rng)).take(count).collect()
-}
-
-/// Crossings of a ray that meets no edge exactly.
-fn crossings(scene: &Scene, mut ray: Ray<f64>) -> u32 {
-    let mut count = 0;
-    while let Some(hit) = scene.closest_hit(&ray) {
-        ray.t_min = hit.t.next_up();
-        count += 1;
-    }
-    count
 }
 
 #[cfg(test)]

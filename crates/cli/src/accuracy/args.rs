@@ -2,10 +2,12 @@
 
 use std::path::PathBuf;
 
+use crate::values;
 use clap::{ArgGroup, Args};
 use firsthit_geometry::Precision;
 use firsthit_import::UpAxis;
 use firsthit_measure::Effort;
+use firsthit_measure::scenario::Scenario;
 use firsthit_measure::workload::RayKind;
 
 const EXAMPLES: &str = "\
@@ -17,13 +19,17 @@ Examples:
   firsthit accuracy --builtin --quick --rays aimed --precision fast,robust
   firsthit accuracy --corpus tests/corpus
       Every engine at every tier on a folder of exact hard cases.
+  firsthit accuracy --scenarios --thorough
+      What must hold on whole meshes: no leaks, exact parity, no self-hits, builds that do not degenerate.
+  firsthit accuracy --scenarios --only S1 --count 1e9 --precision robust
+      A thousand million rays from inside closed meshes; Ctrl-C stops, --from continues.
 
 Exit codes: 0 done, 1 failed (also: a required case was answered wrong), 2 wrong usage, 130 interrupted (what was
 measured so far is printed).";
 
 #[derive(Args, Debug)]
 #[command(args_override_self = true, after_help = EXAMPLES)]
-#[command(group = ArgGroup::new("what").required(true).multiple(true).args(["models", "builtin", "corpus"]))]
+#[command(group = ArgGroup::new("what").required(true).multiple(true).args(["models", "builtin", "corpus", "scenarios"]))]
 pub(crate) struct AccuracyArgs {
     /// Models to measure: .obj, .obj.zst, .gltf, .glb, .toml, .json
     #[arg(value_name = "MODEL")]
@@ -37,7 +43,23 @@ pub(crate) struct AccuracyArgs {
     #[arg(long, value_name = "DIR", conflicts_with_all = ["models", "builtin", "csv", "html", "svg"])]
     pub(crate) corpus: Option<PathBuf>,
 
-    /// Seconds instead of a minute: fewer rays, and the robust tier's guards are not measured one by one
+    /// Run the scenarios on whole meshes instead; those about leaks on the closed MODELs, if given
+    #[arg(long, conflicts_with_all = ["corpus", "csv", "html", "svg", "rays"])]
+    pub(crate) scenarios: bool,
+
+    /// Only these scenarios, comma-separated: S1, S2, ... [default: all]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::scenario, requires = "scenarios")]
+    pub(crate) only: Vec<Scenario>,
+
+    /// So many rays (or what else a scenario counts), as in 1e9 [default: by scenario and effort]
+    #[arg(long, value_name = "N", value_parser = values::count, requires = "scenarios")]
+    pub(crate) count: Option<u64>,
+
+    /// Continue scenario S1 after so many rays
+    #[arg(long, value_name = "N", value_parser = values::count, requires = "scenarios", default_value = "0")]
+    pub(crate) from: u64,
+
+    /// Seconds instead of a minute: fewer rays, no pictures, and the robust tier's guards are not measured one by one
     #[arg(long, overrides_with = "thorough")]
     pub(crate) quick: bool,
 

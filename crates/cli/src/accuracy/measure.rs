@@ -23,27 +23,17 @@ pub(crate) fn run(args: &AccuracyArgs) -> Result<Exit, Failure> {
         check_target(file, &args.models)?;
     }
     let interrupt = Interrupt::listen(console, "printing what was measured so far");
-    let mut subjects = Vec::new();
-    for path in &args.models {
-        let options = firsthit_import::Options { up: args.up, ..Default::default() };
-        let Imported { scene, report } = firsthit_import::open(path, &options)?;
-        console.warnings(&report, false)?;
-        let subject = Subject::new(name(path, &args.models), scene);
-        if subject.triangles() == 0 {
-            let failure = Failure::failed(format_args!("{}: there is no triangle to aim at", path.display()));
-            return Err(failure.hint("analytic shapes are measured beside any model: --builtin"));
-        }
-        subjects.push(subject);
-    }
-    if args.builtin {
-        subjects.push(Subject::builtin());
-    }
-
+    let subjects = subjects(args, console)?;
     interrupt.begin();
     let progress =
         Progress::new(Style::new(args.progress, args.no_progress, args.quiet), "measuring", interrupt.clone());
-    let options =
-        Options { effort: args.effort(), seed: args.seed, tiers: args.tiers(), rays: args.rays(), shapes: true };
+    let options = Options {
+        effort: args.effort(),
+        seed: args.seed,
+        tiers: args.tiers(),
+        rays: args.rays(),
+        ..Options::default()
+    };
     let accuracy = firsthit_measure::run(&subjects, &options, &progress);
     progress.finish();
     let accuracy = accuracy.map_err(Failure::failed)?;
@@ -62,6 +52,26 @@ pub(crate) fn run(args: &AccuracyArgs) -> Result<Exit, Failure> {
         write_charts(path, &accuracy, console)?;
     }
     Ok(if progress.cancelled() { Exit::Interrupted } else { Exit::Done })
+}
+
+/// The models of the arguments.
+pub(super) fn subjects(args: &AccuracyArgs, console: Console) -> Result<Vec<Subject>, Failure> {
+    let mut subjects = Vec::new();
+    for path in &args.models {
+        let options = firsthit_import::Options { up: args.up, ..Default::default() };
+        let Imported { scene, report } = firsthit_import::open(path, &options)?;
+        console.warnings(&report, false)?;
+        let subject = Subject::new(name(path, &args.models), scene);
+        if subject.triangles() == 0 {
+            let failure = Failure::failed(format_args!("{}: there is no triangle to aim at", path.display()));
+            return Err(failure.hint("analytic shapes are measured beside any model: --builtin"));
+        }
+        subjects.push(subject);
+    }
+    if args.builtin {
+        subjects.push(Subject::builtin());
+    }
+    Ok(subjects)
 }
 
 /// The file's name; the whole path where two models have the same.

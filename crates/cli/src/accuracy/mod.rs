@@ -4,6 +4,7 @@ mod args;
 mod corpus;
 mod csv;
 mod measure;
+mod scenarios;
 mod table;
 
 pub(crate) use args::AccuracyArgs;
@@ -14,6 +15,7 @@ use crate::error::{Exit, Failure};
 pub(crate) fn run(args: &AccuracyArgs) -> Result<Exit, Failure> {
     match &args.corpus {
         Some(folder) => corpus::run(args, folder),
+        None if args.scenarios => scenarios::run(args),
         None => measure::run(args),
     }
 }

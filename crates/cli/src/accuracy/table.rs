@@ -53,7 +53,7 @@ fn failures(count: u64, n: u64) -> String {
 fn number(x: f64) -> String {
     match x {
         x if x.is_nan() => "-".into(),
-        x if x == 0.0 => "0".into(),
+        0.0 => "0".into(),
         x if (0.01..1000.0).contains(&x.abs()) => format!("{x:.2}"),
         x => format!("{x:.0e}"),
     }
@@ -65,17 +65,8 @@ fn tiers<'a>(out: &mut String, rows: impl Iterator<Item = &'a TierRow>) {
         if last.is_empty() {
             let _ = writeln!(
                 out,
-                "  {:10} {:7} {:>8} {:>7} {:>7} {:>10} {:>10} {:>10} {:>10}  {}",
-                "rays",
-                "tier",
-                "ns/ray",
-                "+-",
-                "x fast",
-                "leaks",
-                "false hit",
-                "false miss",
-                "self-hits",
-                "t error in ulp: 50 %, 99 %, max"
+                "  {:10} {:7} {:>8} {:>7} {:>7} {:>10} {:>10} {:>10} {:>10}  t error in ulp: 50 %, 99 %, max",
+                "rays", "tier", "ns/ray", "+-", "x fast", "leaks", "false hit", "false miss", "self-hits"
             );
         }
         let rays = if last == r.rays { "" } else { &r.rays };
