@@ -37,13 +37,18 @@ impl Fraction {
     }
 
     /// Halfway between neighbours among the numbers of `R`; half a step beyond the last one where one is infinite.
-    fn between<R: Real>(low: R, high: R) -> Self {
-        let half_step = 0.5 * (R::MAX.to_f64() - R::MAX.next_down().to_f64());
-        match (low.is_finite(), high.is_finite()) {
-            (true, true) => Self::new(low.to_f64(), -high.to_f64(), 2.0),
-            (true, false) => Self::new(low.to_f64(), -half_step, 1.0),
-            _ => Self::new(high.to_f64(), half_step, 1.0),
+    pub(crate) fn between<R: Real>(low: R, high: R) -> Self {
+        let (low, high) = (low.to_f64(), high.to_f64());
+        let last_step = R::MAX.to_f64() - R::MAX.next_down().to_f64();
+        if high.is_infinite() {
+            return Self::new(low, -0.5 * last_step, 1.0);
         }
+        if low.is_infinite() {
+            return Self::new(high, 0.5 * last_step, 1.0);
+        }
+        // Half the least denormal is no float.
+        let half = 0.5 * (high - low);
+        if half > 0.0 { Self::new(low, -half, 1.0) } else { Self::new(low, -high, 2.0) }
     }
 
     fn parts<N: Number>(self) -> (N, N) {
@@ -322,22 +327,29 @@ struct At<'a, X> {
     x: &'a X,
 }
 
-/// `A n + B m`, or `(A n + 2 B m) n + C m^2`.
-fn at<N: Number>(degree: u32, [a, b, c]: &[N; 3], n: &N, m: &N) -> N {
-    let (an, bm) = (a.times(n), b.times(m));
-    if degree == 1 { an.plus(&bm) } else { an.plus(&bm.twice()).times(n).plus(&c.times(&m.squared())) }
+/// `A x + B`, or `(A x + 2 B) x + C`.
+fn at<N: Number>(degree: u32, [a, b, c]: &[N; 3], x: &N) -> N {
+    let ax = a.times(x);
+    if degree == 1 { ax.plus(b) } else { ax.plus(&b.twice()).times(x).plus(c) }
 }
 
 impl Formula for At<'_, Fraction> {
     fn value<N: Number>(&self, c: &[N; 3]) -> N {
         let (n, m) = self.x.parts::<N>();
-        at(self.degree, c, &n, &m)
+        if self.x.c == 1.0 {
+            return at(self.degree, c, &n);
+        }
+        // Homogeneous: A n^2 + 2 (B m) n + C m^2.
+        let [a, b, c] = c;
+        let b = b.times(&m);
+        let c = if self.degree == 1 { N::new(0.0) } else { c.times(&m.squared()) };
+        at(self.degree, &[a.clone(), b, c], &n)
     }
 }
 
 impl At<'_, Dyadic> {
     fn value(&self, c: &[Dyadic; 3]) -> Dyadic {
-        at(self.degree, c, self.x, &Dyadic::new(1.0))
+        at(self.degree, c, self.x)
     }
 }
 
@@ -384,7 +396,7 @@ mod tests {
         fn roots_are_where_the_sign_changes(c in [coefficient(), coefficient(), coefficient()], x in coefficient()) {
             let q = Quadratic::new(Plain(c));
             let exact = c.map(Dyadic::new);
-            let value = at(2, &exact, &Dyadic::new(x), &Dyadic::new(1.0)).signum();
+            let value = at(2, &exact, &Dyadic::new(x)).signum();
             match q.count() {
                 Count::None => prop_assert!(c[0] == 0.0 && c[1] == 0.0 || value == q.leading() && value != 0),
                 Count::Simple => {
