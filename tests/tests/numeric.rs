@@ -79,7 +79,7 @@ fn exact_triangles_have_every_case_right() {
 fn exact_shapes_have_every_case_right() {
     fn check<R: Real>(case: &Case, shape: &Shape<R>, ray: &Ray<R>, failures: &mut Vec<String>) -> bool {
         let mut first = None;
-        let fallback = shape.visit_exact(ray, &mut |found| {
+        let fallback = shape.visit_exact(ray, &mut |found, _| {
             first = Some(found.hit);
             ControlFlow::Break(())
         });

@@ -2,6 +2,7 @@
 
 use core::ops::ControlFlow;
 
+use firsthit_geometry::exact::ExactRay;
 use firsthit_geometry::shapes::{Cuboid, Disk, Plane, Polygon, Quadric, Solid, Sphere};
 use firsthit_geometry::{Aabb, ExactSurfaceHit, Primitive, Ray, Real, Shape};
 use glam::DVec3;
@@ -40,7 +41,7 @@ fn dot(a: [i128; 3], b: [i128; 3]) -> i128 {
 
 fn all<R: Real>(shape: &impl Primitive<R>, ray: &Ray<R>) -> Vec<ExactSurfaceHit<R>> {
     let mut hits = Vec::new();
-    shape.visit_exact(ray, &mut |hit| {
+    shape.visit_exact(ray, &mut |hit, _| {
         hits.push(hit);
         ControlFlow::Continue(())
     });
@@ -324,6 +325,34 @@ proptest! {
             let slope = form(q, o + way).1.dot(ray.direction).abs();
             let kappa = form(q.map(f64::abs), o.abs() + way.abs()).0 / (exact.t.abs() * slope);
             prop_assert!((exact.t - double.t).abs() <= 16.0 * kappa * f64::UNIT_ROUNDOFF * exact.t.abs());
+        }
+    }
+
+    /// Exact parameters of hits on different shapes, and on triangles, compare as the quotients and roots they are.
+    #[test]
+    fn hits_on_different_surfaces_are_ordered(
+        c in point(4), r in 1..6i32, n in direction(3), v in [point(4), point(4), point(4)], o in point(8), d in direction(3)
+    ) {
+        let ray = line(o, d);
+        let shapes = [
+            Shape::from(Sphere::new(vec(c), r.into()).unwrap()),
+            Plane::new(vec(c), vec(n)).unwrap().into(),
+            Cuboid::new(vec(c), vec(c) + f64::from(r)).unwrap().into(),
+            Solid::new(Quadric::cylinder(f64::from(r), -2.0, 2.0).unwrap()).into(),
+        ];
+        let mut found = Vec::new();
+        for shape in &shapes {
+            for hit in all(shape, &ray) {
+                found.push((hit.hit.t, shape.exact_root(&ray, hit.hit.t).unwrap()));
+            }
+        }
+        let exact = ExactRay::new(ray).unwrap();
+        found.extend(exact.hit(v.map(vec)).map(|hit| (hit.t, exact.root(&hit))));
+        for (t, x) in &found {
+            for (s, y) in &found {
+                // Rounding is monotone, and different roots of such small equations do not round to one.
+                prop_assert_eq!(Some(x.cmp(y)), t.partial_cmp(s), "{} {}", t, s);
+            }
         }
     }
 

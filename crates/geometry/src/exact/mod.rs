@@ -6,7 +6,9 @@
 pub(crate) mod dyadic;
 pub(crate) mod number;
 pub(crate) mod quadratic;
+mod root;
 mod triangle;
 mod twofold;
 
+pub use root::Root;
 pub use triangle::{ExactHit, ExactRay};

@@ -10,6 +10,7 @@ use core::cmp::Ordering;
 
 use super::dyadic::{Dyadic, Place};
 use super::number::{Ball, Number, Wide};
+use super::root::Root;
 use crate::{Ray, Real};
 
 /// What gives a quadratic its coefficients `A`, `B`, `C` of `A t^2 + 2 B t + C`.
@@ -206,24 +207,12 @@ impl<E: Equation> Quadratic<E> {
     /// The same, with `sign` to tell signs.
     fn order_by<X>(&self, side: Side, sign: impl Fn(&At<'_, X>) -> i32, x: &X) -> Ordering {
         let at = |degree| sign(&At { degree, x });
-        match self.leading() {
-            // The line rises with B: it is positive right of its root.
-            0 => (-at(2) * self.slope()).cmp(&0),
-            leading => match (at(2) * leading, side) {
-                (..0, Side::Lower) => Ordering::Less,
-                (..0, Side::Upper) => Ordering::Greater,
-                (value, side) => {
-                    // Right of the middle of the roots, or left.
-                    let right = at(1) * leading;
-                    match (value, side) {
-                        (_, Side::Lower) if right > 0 => Ordering::Less,
-                        (_, Side::Upper) if right < 0 => Ordering::Greater,
-                        (0, _) => Ordering::Equal,
-                        _ => (-right).cmp(&0),
-                    }
-                }
-            },
-        }
+        placed(self.leading(), || self.slope(), side, || at(2), || at(1))
+    }
+
+    /// A root as a number of its own.
+    pub(crate) fn root(&self, side: Side) -> Root {
+        Root { coefficients: self.equation.coefficients(), side }
     }
 
     /// Whether a root lies in the closed interval of a ray.
@@ -271,6 +260,34 @@ impl<E: Equation> Quadratic<E> {
 /// Whether `R` is `f32`.
 fn is_single<R: Real>() -> bool {
     R::MAX.to_f64() < f64::MAX
+}
+
+/// How a root of a form compares with a number `x`, from signs: of `A`, of `B`, of the form at `x` and of half its
+/// derivative there.
+pub(super) fn placed(
+    leading: i32,
+    slope: impl FnOnce() -> i32,
+    side: Side,
+    value: impl FnOnce() -> i32,
+    derivative: impl FnOnce() -> i32,
+) -> Ordering {
+    if leading == 0 {
+        // The line rises with B: it is positive right of its root.
+        return (-value() * slope()).cmp(&0);
+    }
+    let value = value() * leading;
+    if value < 0 {
+        // Between the roots.
+        return if side == Side::Lower { Ordering::Less } else { Ordering::Greater };
+    }
+    // Right of the middle of the roots, or left.
+    let right = derivative() * leading;
+    match side {
+        Side::Lower if right > 0 => Ordering::Less,
+        Side::Upper if right < 0 => Ordering::Greater,
+        _ if value == 0 => Ordering::Equal,
+        _ => (-right).cmp(&0),
+    }
 }
 
 /// Of two neighbours the one whose last bit is 0.

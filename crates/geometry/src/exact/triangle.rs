@@ -21,6 +21,7 @@ use core::cmp::Ordering;
 use glam::DVec3;
 
 use super::dyadic::{Dyadic, Place, cross, dot, minus, vector};
+use super::root::Root;
 use super::twofold::Twofold;
 use crate::{Ray, triangle::Shear};
 
@@ -163,6 +164,13 @@ impl ExactRay {
             let ((n, d), (m, e)) = (self.quotient(&a.vertices), self.quotient(&b.vertices));
             (n * e).cmp(&(m * d))
         })
+    }
+
+    /// The exact parameter of a hit of this ray, to order it among hits on other surfaces.
+    #[must_use]
+    pub fn root(&self, hit: &ExactHit) -> Root {
+        let (n, d) = self.quotient(&hit.vertices);
+        Root::quotient(n, d)
     }
 
     /// The parameter of a hit of this ray, correctly rounded to `f32`: once, not from the rounded `f64`.

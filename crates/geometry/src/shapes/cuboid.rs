@@ -6,6 +6,7 @@ use core::ops::ControlFlow;
 use super::common::{cast, padded};
 use super::exact::visit_at;
 use super::{ExactSurfaceHit, ExactVisitor, Primitive, ShapeError, SurfaceHit};
+use crate::exact::Root;
 use crate::exact::quadratic::{Fraction, Quadratic, Side};
 use crate::{Aabb, Ray, Real, Vector3};
 
@@ -60,6 +61,10 @@ pub(super) struct ExactEnd {
 }
 
 impl ExactEnd {
+    pub(super) fn root(&self) -> Root {
+        Quadratic::new(self.at).root(Side::Lower)
+    }
+
     /// Its parameter, correctly rounded.
     pub(super) fn nearest<R: Real>(&self, fallback: &mut bool) -> R {
         let equation = Quadratic::new(self.at);
@@ -256,7 +261,7 @@ impl<R: Real> Primitive<R> for Cuboid<R> {
             if end.at.is_in(&line, &mut fallback) {
                 let hit = |t| Self::face_hit(&self.bounds, ray, t, end.axis, end.entry);
                 let found = |t| ExactSurfaceHit { hit: hit(t), crosses: !touched };
-                if visit_at(end.nearest(&mut fallback), found, visit) == ControlFlow::Break(()) {
+                if visit_at(end.nearest(&mut fallback), found, &|| end.root(), visit) == ControlFlow::Break(()) {
                     break;
                 }
             }

@@ -5,6 +5,7 @@ use core::ops::ControlFlow;
 use glam::DVec3;
 
 use super::{ExactSurfaceHit, ExactVisitor, SurfaceHit};
+use crate::exact::Root;
 use crate::exact::number::{Number, differences, dot, vector};
 use crate::exact::quadratic::{Count, Equation, Formula, Fraction, Quadratic, Side};
 use crate::{Aabb, Ray, Real};
@@ -21,7 +22,7 @@ pub(super) fn visit_roots<R: Real, E: Equation>(
     for &side in count.sides() {
         if quadratic.admits(side, &interval) && admitted(side) {
             let found = |t| ExactSurfaceHit { hit: hit(t), crosses: count != Count::Double };
-            if visit_at(quadratic.nearest(side), found, visit).is_break() {
+            if visit_at(quadratic.nearest(side), found, &|| quadratic.root(side), visit).is_break() {
                 break;
             }
         }
@@ -33,9 +34,10 @@ pub(super) fn visit_roots<R: Real, E: Equation>(
 pub(super) fn visit_at<R: Real>(
     t: R,
     hit: impl FnOnce(R) -> ExactSurfaceHit<R>,
+    root: &dyn Fn() -> Root,
     visit: &mut ExactVisitor<'_, R>,
 ) -> ControlFlow<()> {
-    if t.is_finite() { visit(hit(t)) } else { ControlFlow::Continue(()) }
+    if t.is_finite() { visit(hit(t), root) } else { ControlFlow::Continue(()) }
 }
 
 /// `n.(o + t d - p) = 0`

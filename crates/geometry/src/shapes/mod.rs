@@ -14,7 +14,7 @@
 
 use core::ops::ControlFlow;
 
-use crate::{Aabb, Ray, Real};
+use crate::{Aabb, Ray, Real, exact::Root};
 
 /// Where a ray meets a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,7 +48,8 @@ pub struct ExactSurfaceHit<R: Real> {
 }
 
 /// What is asked about each exact hit; it may stop the search.
-pub type ExactVisitor<'a, R> = dyn FnMut(ExactSurfaceHit<R>) -> ControlFlow<()> + 'a;
+/// The second argument computes the exact parameter, which costs more than the hit.
+pub type ExactVisitor<'a, R> = dyn FnMut(ExactSurfaceHit<R>, &dyn Fn() -> Root) -> ControlFlow<()> + 'a;
 
 /// What every primitive answers, in the arithmetic of `R`.
 pub trait Primitive<R: Real> {
@@ -78,7 +79,7 @@ pub trait Primitive<R: Real> {
     /// use glam::DVec3;
     /// let sphere = Sphere::new(DVec3::ZERO, 1.0)?;
     /// let mut hits = Vec::new();
-    /// let visit = &mut |h: firsthit_geometry::ExactSurfaceHit<f64>| {
+    /// let visit = &mut |h: firsthit_geometry::ExactSurfaceHit<f64>, _: &dyn Fn() -> _| {
     ///     hits.push((h.hit.t, h.crosses));
     ///     ControlFlow::Continue(())
     /// };
@@ -93,11 +94,25 @@ pub trait Primitive<R: Real> {
     /// The first hit of [`Primitive::visit_exact`].
     fn closest_hit_exact(&self, ray: &Ray<R>) -> Option<SurfaceHit<R>> {
         let mut first = None;
-        self.visit_exact(ray, &mut |found| {
+        self.visit_exact(ray, &mut |found, _| {
             first = Some(found.hit);
             ControlFlow::Break(())
         });
         first
+    }
+
+    /// The exact parameter of the first hit of [`Primitive::visit_exact`] whose rounded one is `t`: it orders hits on
+    /// different surfaces.
+    fn exact_root(&self, ray: &Ray<R>, t: R) -> Option<Root> {
+        let mut exact = None;
+        self.visit_exact(ray, &mut |found, root| {
+            if found.hit.t == t {
+                exact = Some(root());
+                return ControlFlow::Break(());
+            }
+            ControlFlow::Continue(())
+        });
+        exact
     }
 
     /// Whether anything is hit in the closed interval: the same decision as [`Primitive::closest_hit`].

@@ -208,7 +208,11 @@ impl<R: Real> Primitive<R> for Solid<R> {
                     };
                     ExactSurfaceHit { hit, crosses: order.is_lt() }
                 };
-                if visit_at(ends.nearest(place), found, visit).is_break() {
+                let root = || match place {
+                    ExactPlace::Side(side) => equation.root(side),
+                    ExactPlace::Cap(end) => end.root(),
+                };
+                if visit_at(ends.nearest(place), found, &root, visit).is_break() {
                     return ends.fallback || equation.fallback();
                 }
             }
