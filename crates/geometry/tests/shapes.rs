@@ -151,6 +151,7 @@ fn check_hit<R: Real>(shape: &Shape<R>, truth: &Shape<f64>, ray: &Ray<R>) -> Res
     }
     let hit = shape.closest_hit(ray);
     prop_assert_eq!(hit.is_some(), shape.any_hit(ray));
+    check_exact(shape, ray)?;
     let Some(hit) = hit else { return Ok(()) };
 
     // The interval is closed: cut down to the hit itself it still holds the hit.
@@ -167,6 +168,27 @@ fn check_hit<R: Real>(shape: &Shape<R>, truth: &Shape<f64>, ray: &Ray<R>) -> Res
     Ok(())
 }
 
+/// What the exact form finds is in the interval and in the bounds, and near what the stable form finds in f64.
+fn check_exact<R: Real>(shape: &Shape<R>, ray: &Ray<R>) -> Result<(), TestCaseError> {
+    let exact = shape.closest_hit_exact(ray);
+    if let Some(hit) = exact {
+        prop_assert!(ray.contains(hit.t) && hit.t.is_finite());
+        prop_assert!(hit.normal.is_none_or(|n| (n.length().to_f64() - 1.0).abs() <= 4.0 * R::UNIT_ROUNDOFF.to_f64()));
+        let (point, _) = refined(shape, ray, &hit);
+        prop_assert!(shape.bounds().contains(point), "{point:?} outside {:?}", shape.bounds());
+    }
+    if R::MAX.to_f64() == f64::MAX {
+        let stable = shape.closest_hit(ray);
+        prop_assert_eq!(exact.is_some(), stable.is_some(), "{:?} {:?}", exact, stable);
+        if let (Some(a), Some(b)) = (exact, stable) {
+            let (off, size) = ((a.t - b.t).to_f64().abs(), a.t.to_f64().abs());
+            // A tangent ray has half the digits.
+            prop_assert!(off <= 1e-6 * size, "{} {}", a.t, b.t);
+        }
+    }
+    Ok(())
+}
+
 /// A ray that leaves the surface by the bound hits the same piece again only if the exact shape is really hit there.
 fn check_leaving<R: Real>(
     shape: &Shape<R>,
@@ -174,14 +196,25 @@ fn check_leaving<R: Real>(
     ray: &Ray<R>,
     away: DVec3,
 ) -> Result<(), TestCaseError> {
-    let Some(hit) = shape.closest_hit(ray) else { return Ok(()) };
+    check_leaving_by(|r| shape.closest_hit(r), shape, truth, ray, away)?;
+    check_leaving_by(|r| shape.closest_hit_exact(r), shape, truth, ray, away)
+}
+
+fn check_leaving_by<R: Real>(
+    closest_hit: impl Fn(&Ray<R>) -> Option<SurfaceHit<R>>,
+    shape: &Shape<R>,
+    truth: &Shape<f64>,
+    ray: &Ray<R>,
+    away: DVec3,
+) -> Result<(), TestCaseError> {
+    let Some(hit) = closest_hit(ray) else { return Ok(()) };
     let Some(normal) = hit.normal else { return Ok(()) };
     let (point, error) = refined(shape, ray, &hit);
     for away in [away, -away] {
         let direction = R::Vec3::from_f64(away);
         let start = offset::leave::<R>(point, R::Vec3::splat(error), normal, direction);
         let leaving = Ray::<R>::new(start, direction);
-        let Some(again) = shape.closest_hit(&leaving) else { continue };
+        let Some(again) = closest_hit(&leaving) else { continue };
         // Which side of a plane a ray within rounding of it leaves to cannot be told: hence `is_flat`.
         let in_plane = normal.to_f64().dot(away).abs() < 1e-6;
         prop_assert!(!shape.is_flat() || in_plane, "a flat shape is hit again at {}", again.t);

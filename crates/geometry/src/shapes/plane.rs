@@ -56,6 +56,11 @@ impl<R: Real> Plane<R> {
         self.normal
     }
 
+    /// The normal as given.
+    pub(super) fn given(&self) -> R::Vec3 {
+        self.given
+    }
+
     /// The same plane in another arithmetic.
     ///
     /// # Errors

@@ -5,7 +5,8 @@ use glam::DVec3;
 use super::common::{cast, finite, padded, unit};
 use super::exact::{Coordinate, visit_roots};
 use super::{ExactVisitor, Plane, Primitive, ShapeError, SurfaceHit};
-use crate::exact::number::{Number, cross, differences, dot, vector};
+use crate::exact::dyadic::Dyadic;
+use crate::exact::number::{Ball, Number, cross, differences, dot, vector};
 use crate::exact::quadratic::{Equation, Formula, Quadratic};
 use crate::{Aabb, Ray, Real, Vector3};
 
@@ -19,15 +20,14 @@ use crate::{Aabb, Ray, Real, Vector3};
 /// orientation, as in a figure of eight. `u` and `v` run from 0 to 1 across the bounds of the two coordinates kept
 /// when the one with the largest normal component is dropped, in the order x, y, z.
 ///
-/// Error of `t`: that of [`Plane`]. Exactly, the plane is that of three vertices far apart: the first one, the one
-/// farthest from it, and the one farthest from the line through both. If all vertices lie in one plane exactly, it is
-/// that plane.
+/// Error of `t`: that of [`Plane`]. At tier `Exact` the plane is the one in which all vertices lie exactly; if there is
+/// none, that through the first vertex with the rounded normal, as at the other tiers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Polygon<R: Real> {
     loops: Vec<Vec<R::Vec3>>,
     plane: Plane<R>,
-    /// Three vertices that span the exact plane.
-    span: [R::Vec3; 3],
+    /// Three vertices that span the plane, if all lie in it exactly.
+    span: Option<[R::Vec3; 3]>,
     normal: Option<R::Vec3>,
     bounds: Aabb<R>,
     /// The two axes that are kept.
@@ -90,6 +90,8 @@ impl<R: Real> Polygon<R> {
         let (newell, terms) = newell::<R>(&loops[0], exact);
         let oriented = newell.length() > 1e-10 * terms;
         let (span, across) = widest::<R>(&loops, exact);
+        let spanned = Spanned { corners: span.map(Vector3::to_f64) };
+        let span = loops.iter().flatten().all(|v| spanned.contains(v.to_f64())).then_some(span);
         let direction = if oriented { newell } else { across };
         let direction = unit::<f64>(direction).ok_or(ShapeError::Degenerate("all vertices lie on a line"))?;
 
@@ -187,17 +189,44 @@ fn widest<R: Real>(loops: &[Vec<R::Vec3>], exact: impl Fn(R::Vec3) -> DVec3) -> 
     ([first, second, third], if flat { normal } else { DVec3::ZERO })
 }
 
-/// `n.(o + t d - a) = 0`, `n = (b - a) x (c - a)`.
+/// The plane of three points.
 struct Spanned {
-    ray: Ray<f64>,
     corners: [DVec3; 3],
 }
 
-impl Equation for Spanned {
-    fn coefficients<N: Number>(&self) -> [N; 3] {
+impl Spanned {
+    fn normal<N: Number>(&self) -> [N; 3] {
         let [a, b, c] = self.corners;
-        let n = cross::<N>(&differences(b, a), &differences(c, a));
-        let offset = dot(&n, &differences(self.ray.origin, a));
+        cross(&differences(b, a), &differences(c, a))
+    }
+
+    /// Whether a point lies in it, exactly.
+    fn contains(&self, point: DVec3) -> bool {
+        fn sign<N: Number>(plane: &Spanned, point: DVec3) -> Option<i32> {
+            dot(&plane.normal::<N>(), &differences(point, plane.corners[0])).sign()
+        }
+        sign::<Ball>(self, point).or_else(|| sign::<Dyadic>(self, point)) == Some(0)
+    }
+}
+
+/// The exact plane along a ray.
+struct Along {
+    ray: Ray<f64>,
+    plane: ExactPlane,
+}
+
+enum ExactPlane {
+    Spanned(Spanned),
+    Given { point: DVec3, normal: DVec3 },
+}
+
+impl Equation for Along {
+    fn coefficients<N: Number>(&self) -> [N; 3] {
+        let (point, n) = match &self.plane {
+            ExactPlane::Spanned(spanned) => (spanned.corners[0], spanned.normal::<N>()),
+            ExactPlane::Given { point, normal } => (*point, vector(*normal)),
+        };
+        let offset = dot(&n, &differences(self.ray.origin, point));
         [N::new(0.0), dot(&n, &vector(self.ray.direction)), offset.twice()]
     }
 }
@@ -219,7 +248,7 @@ impl Formula for Turn {
 
 impl<R: Real> Polygon<R> {
     /// [`Self::contains`] for the exact hit point.
-    fn contains_hit(&self, equation: &Quadratic<Spanned>) -> bool {
+    fn contains_hit(&self, equation: &Quadratic<Along>) -> bool {
         let ray = equation.equation().ray;
         let coordinate = |i: usize, from: f64| Coordinate {
             origin: ray.origin[self.kept[i]],
@@ -263,8 +292,11 @@ impl<R: Real> Primitive<R> for Polygon<R> {
         if !ray.is_valid() {
             return false;
         }
-        let corners = self.span.map(Vector3::to_f64);
-        let equation = Quadratic::new(Spanned { ray: ray.to_f64(), corners });
+        let plane = match self.span {
+            Some(span) => ExactPlane::Spanned(Spanned { corners: span.map(Vector3::to_f64) }),
+            None => ExactPlane::Given { point: self.plane.point().to_f64(), normal: self.plane.given().to_f64() },
+        };
+        let equation = Quadratic::new(Along { ray: ray.to_f64(), plane });
         visit_roots(&equation, ray, |_| self.contains_hit(&equation), |t| self.hit(ray, t), visit)
     }
 
