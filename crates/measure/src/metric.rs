@@ -3,7 +3,7 @@
 use firsthit_accel::{Crossings, Hit, Scene};
 use firsthit_geometry::error::difference_of_products;
 use firsthit_geometry::transform::Transform;
-use firsthit_geometry::{Ray, Real};
+use firsthit_geometry::{Precision, Ray, Real};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -34,6 +34,10 @@ pub struct Errors {
     pub self_hits: u64,
     /// Bounced rays.
     pub bounces: u64,
+    /// Of the rays in `counted`, those for which the exact tier needed more than `f64`.
+    pub fallbacks: u64,
+    /// The first rays, of which a hit is bounced.
+    pub counted: u64,
     /// Error of t in f32 ulps, of hits on an exactly nearest triangle.
     t_ulp: Vec<f64>,
     t_ulp_kappa_max: f64,
@@ -74,6 +78,10 @@ pub fn compare(
             errors.compare(subject, truth.scene, ray, found.as_ref(), exact.as_ref());
             if set.inside && found.is_none() {
                 errors.leaked.push(index);
+            }
+            if index < bounces {
+                errors.counted += 1;
+                errors.fallbacks += u64::from(scene.closest_hit_counted(ray).1.fallbacks > 0);
             }
             if let Some(hit) = found.filter(|_| index < bounces) {
                 errors.bounce(scene, ray, &hit, &mut Rng(index as u64));
@@ -147,6 +155,8 @@ impl Errors {
         self.leaked.extend(other.leaked);
         self.self_hits += other.self_hits;
         self.bounces += other.bounces;
+        self.fallbacks += other.fallbacks;
+        self.counted += other.counted;
         self.t_ulp.extend(other.t_ulp);
         self.t_ulp_kappa_max = self.t_ulp_kappa_max.max(other.t_ulp_kappa_max);
         self.surface_ulp.extend(other.surface_ulp);
@@ -166,6 +176,8 @@ impl Errors {
         row.wrong_ids = self.wrong_ids;
         row.self_hits = self.self_hits;
         row.bounces = self.bounces;
+        let exact = row.tier == Precision::Exact.name() && self.counted > 0;
+        row.fallback_rate = exact.then(|| self.fallbacks as f64 / self.counted as f64);
         self.t_ulp.sort_by(f64::total_cmp);
         self.surface_ulp.sort_by(f64::total_cmp);
         self.normal.sort_by(f64::total_cmp);
@@ -217,7 +229,6 @@ mod tests {
     use crate::subject::Subject;
     use crate::workload::{RayKind, Size, ray_sets};
     use firsthit_accel::{BuildOptions, SceneBuilder};
-    use firsthit_geometry::Precision;
 
     fn errors(options: BuildOptions, kind: RayKind) -> (TierRow, Errors) {
         let subject = Subject::builtin();

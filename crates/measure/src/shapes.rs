@@ -19,17 +19,19 @@ enum Form {
     Textbook,
     Stable32,
     Stable64,
+    Exact,
 }
 
 impl Form {
     /// The last is the reference.
-    const ALL: [Self; 3] = [Self::Textbook, Self::Stable32, Self::Stable64];
+    const ALL: [Self; 4] = [Self::Textbook, Self::Stable32, Self::Stable64, Self::Exact];
 
     fn name(self) -> &'static str {
         match self {
             Self::Textbook => "textbook f32",
             Self::Stable32 => "stable f32",
             Self::Stable64 => "stable f64",
+            Self::Exact => "exact",
         }
     }
 }
@@ -57,14 +59,21 @@ impl Subject {
     }
 
     fn t(&self, form: Form, ray: &Ray<f32>) -> Option<f64> {
-        match (self, form) {
-            (Self::Shape { single, .. }, Form::Textbook) => single.closest_hit_fast(ray).map(|h| h.t.into()),
-            (Self::Shape { single, .. }, Form::Stable32) => single.closest_hit(ray).map(|h| h.t.into()),
-            (Self::Shape { double, .. }, Form::Stable64) => double.closest_hit(&ray.to_f64()).map(|h| h.t),
-            (Self::Triangle(v), Form::Textbook) => triangle::intersect(Precision::Fast, *v, ray).map(|h| h.t.into()),
-            (Self::Triangle(v), Form::Stable32) => triangle::intersect(Precision::Robust, *v, ray).map(|h| h.t.into()),
-            (Self::Triangle(v), Form::Stable64) => {
-                triangle::intersect::<f64>(Precision::Double, v.map(Vector3::to_f64), &ray.to_f64()).map(|h| h.t)
+        match self {
+            Self::Shape { single, double, .. } => match form {
+                Form::Textbook => single.closest_hit_fast(ray).map(|h| h.t.into()),
+                Form::Stable32 => single.closest_hit(ray).map(|h| h.t.into()),
+                Form::Stable64 => double.closest_hit(&ray.to_f64()).map(|h| h.t),
+                Form::Exact => double.closest_hit_exact(&ray.to_f64()).map(|h| h.t),
+            },
+            Self::Triangle(v) => {
+                let (v64, ray64) = (v.map(Vector3::to_f64), ray.to_f64());
+                match form {
+                    Form::Textbook => triangle::intersect(Precision::Fast, *v, ray).map(|h| h.t.into()),
+                    Form::Stable32 => triangle::intersect(Precision::Robust, *v, ray).map(|h| h.t.into()),
+                    Form::Stable64 => triangle::intersect::<f64>(Precision::Double, v64, &ray64).map(|h| h.t),
+                    Form::Exact => triangle::intersect::<f64>(Precision::Exact, v64, &ray64).map(|h| h.t),
+                }
             }
         }
     }

@@ -164,3 +164,10 @@ fn an_origin_far_outside() {
         }
     }
 }
+
+/// S3 and S13: scaled, moved, rounded again, built again, on other threads.
+#[test]
+fn scale_place_threads_and_builds_change_no_answer() {
+    crate::holds("S3", 8_000);
+    crate::holds("S13", 20_000);
+}

@@ -13,6 +13,7 @@ mod twins;
 
 use firsthit_accel::{BuildOptions, Geometry, Hit, HitId, Scene, SceneBuilder};
 use firsthit_geometry::Precision;
+use firsthit_measure::scenario::{self, Settings};
 use firsthit_tests::oracle::Mesh;
 use glam::DAffine3;
 
@@ -27,6 +28,20 @@ fn options(precision: Precision) -> BuildOptions {
 
 fn triangles(mesh: &Mesh) -> Geometry {
     Geometry::Triangles { positions: mesh.positions.clone(), triangles: mesh.triangles.clone() }
+}
+
+/// Runs a scenario on so many rays, prints what it came to, and fails if anything did not hold.
+fn holds(id: &str, count: u64) {
+    holds_at(id, count, &Precision::ALL);
+}
+
+fn holds_at(id: &str, count: u64, tiers: &[Precision]) {
+    let known = scenario::ALL.into_iter().find(|s| s.id == id).expect("a scenario");
+    let settings = Settings { count: Some(count), tiers: tiers.to_vec(), ..Settings::default() };
+    for outcome in scenario::run(&[known], &settings) {
+        firsthit_tests::summary(outcome.to_string().trim_end());
+        assert!(outcome.passed() && outcome.count > 0, "{outcome}");
+    }
 }
 
 /// One mesh, placed once.

@@ -148,3 +148,9 @@ fn the_source_is_skipped_but_not_its_neighbours() {
     let second = scene.closest_hit_filtered(&ray, Some(first.id), |_| true).expect("below it");
     assert!(second.t > first.t && second.id != first.id);
 }
+
+/// S4: 10^6 bounces at scales 1e-5 to 1e6 and offsets to 1e6.
+#[test]
+fn a_million_bounced_rays_do_not_meet_what_they_left() {
+    crate::holds("S4", 300_000);
+}

@@ -169,3 +169,11 @@ fn bounds_hold_what_is_seen() {
     assert!(stats.depth > 8 && stats.depth < 40 && stats.bytes > 1280 * 36 && stats.sah_cost > 1.0);
     assert!(SceneBuilder::default().build().expect("nothing is a scene").bounds().is_empty());
 }
+
+/// S11, S14 and S15 by the scenarios.
+#[test]
+fn instances_invalid_rays_and_overlapping_faces() {
+    crate::holds("S11", 5_000);
+    crate::holds("S14", 30_000);
+    crate::holds("S15", 2_000);
+}

@@ -75,7 +75,7 @@ fn tiers<'a>(out: &mut String, rows: impl Iterator<Item = &'a TierRow>) {
         let leaks = r.leaks.map_or("-".into(), |n| failures(n, r.aimed_rays));
         let _ = writeln!(
             out,
-            "  {rays:10} {:7} {:8.1} {spread:5.1} % {:7.2} {leaks:>10} {:>10} {:>10} {:>10}  {}, {}, {}",
+            "  {rays:10} {:7} {:8.1} {spread:5.1} % {:7.2} {leaks:>10} {:>10} {:>10} {:>10}  {}, {}, {}{}",
             r.tier,
             r.ns_per_ray,
             r.ratio_to_fast,
@@ -84,7 +84,8 @@ fn tiers<'a>(out: &mut String, rows: impl Iterator<Item = &'a TierRow>) {
             failures(r.self_hits, r.bounces),
             number(r.t_ulp_p50),
             number(r.t_ulp_p99),
-            number(r.t_ulp_max)
+            number(r.t_ulp_max),
+            r.fallback_rate.map_or(String::new(), |f| format!("; beyond f64: {:.2} %", f * 100.0))
         );
     }
 }

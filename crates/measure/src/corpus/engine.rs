@@ -52,7 +52,7 @@ impl Engine {
         match self {
             Self::Primitives => match precision {
                 Precision::Fast | Precision::Robust => primitive::<f32>(case, precision, &case.ray),
-                _ => primitive::<f64>(case, precision, &case.ray.to_f64()),
+                Precision::Double | Precision::Exact => primitive::<f64>(case, precision, &case.ray.to_f64()),
             },
             Self::Slabs => slab(case, precision),
             Self::Scene(layout, form) => scene(case, precision, layout, form),
@@ -65,7 +65,7 @@ impl Engine {
     pub fn promises(self, precision: Precision) -> Precision {
         match (self, precision) {
             (Self::Slabs, Precision::Fast | Precision::Robust) => precision,
-            (Self::Slabs, _) => Precision::Double,
+            (Self::Slabs, Precision::Double | Precision::Exact) => Precision::Double,
             _ => precision,
         }
     }
@@ -127,14 +127,15 @@ fn primitive<R: Real>(case: &Case, precision: Precision, ray: &Ray<R>) -> Answer
             }
         }
         Primitive::Aabb { min, max } => match Cuboid::<R>::new(cast::<R>(*min), cast::<R>(*max)) {
-            Ok(cuboid) => solid_box(&cuboid, ray),
+            Ok(cuboid) => solid_box(&cuboid, precision, ray),
             Err(e) => Answer::Refused(e.to_string()),
         },
         other => match shape::<R>(other) {
             Ok(Some(shape)) => {
                 let hit = match precision {
                     Precision::Fast => shape.closest_hit_fast(ray),
-                    _ => shape.closest_hit(ray),
+                    Precision::Robust | Precision::Double => shape.closest_hit(ray),
+                    Precision::Exact => shape.closest_hit_exact(ray),
                 };
                 hit.map_or(Answer::Miss, |hit| {
                     let normal = hit.normal.map(Vector3::to_f64);
@@ -161,9 +162,12 @@ fn triangles<R: Real>(precision: Precision, triangles: &[[Point; 3]], ray: &Ray<
 }
 
 /// A box is hit when the ray is in it anywhere; its surface only when the ray also enters or leaves.
-fn solid_box<R: Real>(cuboid: &Cuboid<R>, ray: &Ray<R>) -> Answer {
-    let Some(stay) = cuboid.overlap(ray) else { return Answer::Miss };
-    let surface = cuboid.closest_hit(ray);
+fn solid_box<R: Real>(cuboid: &Cuboid<R>, precision: Precision, ray: &Ray<R>) -> Answer {
+    let (stay, surface) = match precision {
+        Precision::Exact => (cuboid.overlap_exact(ray), cuboid.closest_hit_exact(ray)),
+        _ => (cuboid.overlap(ray), cuboid.closest_hit(ray)),
+    };
+    let Some(stay) = stay else { return Answer::Miss };
     Answer::Hit(Found {
         t: surface.map(|hit| hit.t.to_f64()),
         stay: Some(stay.map(Real::to_f64)),
@@ -182,7 +186,7 @@ fn slab(case: &Case, precision: Precision) -> Answer {
     match precision {
         Precision::Fast => test::<f32>(*min, *max, &case.ray, false),
         Precision::Robust => test::<f32>(*min, *max, &case.ray, true),
-        _ => test::<f64>(*min, *max, &case.ray.to_f64(), true),
+        Precision::Double | Precision::Exact => test::<f64>(*min, *max, &case.ray.to_f64(), true),
     }
 }
 

@@ -28,8 +28,6 @@ pub fn required(case: &Case, precision: Precision) -> bool {
         Precision::Robust => level == Level::F32 || never_missed(case),
         Precision::Double => level <= Level::F64 || never_missed(case),
         Precision::Exact => true,
-        #[allow(unreachable_patterns, reason = "as long as there is no more careful tier")]
-        _ => true,
     }
 }
 
@@ -38,8 +36,7 @@ fn promised(precision: Precision) -> Level {
     match precision {
         Precision::Fast | Precision::Robust => Level::F32,
         Precision::Double => Level::F64,
-        #[allow(unreachable_patterns, reason = "as long as there is no more careful tier")]
-        _ => Level::Exact,
+        Precision::Exact => Level::Exact,
     }
 }
 
