@@ -23,7 +23,7 @@
 //! # Ok::<(), firsthit_accel::BuildError>(())
 //! ```
 
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 
 mod build;
 mod build_options;
@@ -41,10 +41,13 @@ mod order;
 mod query;
 pub mod reference;
 mod scene;
+#[allow(unsafe_code, reason = "the room for instructions of the processor")]
+mod simd;
 mod stats;
 mod surface_point;
 mod traverse;
 mod visit_order;
+mod wide;
 
 pub use build_options::{BuildOptions, BuildQuality, Layout};
 pub use builder::{Geometry, SceneBuilder};

@@ -17,6 +17,9 @@ pub(crate) trait Probe {
     /// A hit needed more than `f64`.
     #[inline(always)]
     fn fallback(&mut self) {}
+    /// A block of primitives was tested; `u32::MAX` stands for none.
+    #[inline(always)]
+    fn block(&mut self, _primitives: &[u32]) {}
 }
 
 /// Watches nothing.
@@ -35,6 +38,11 @@ impl Probe for TraversalCounts {
     #[inline(always)]
     fn fallback(&mut self) {
         self.fallbacks = self.fallbacks.saturating_add(1);
+    }
+    #[inline(always)]
+    fn block(&mut self, primitives: &[u32]) {
+        let used = primitives.iter().filter(|&&p| p != u32::MAX).count();
+        self.primitives = self.primitives.saturating_add(used as u32);
     }
 }
 

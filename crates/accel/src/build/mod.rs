@@ -54,10 +54,25 @@ pub(crate) struct Topology {
 impl Topology {
     /// A tree over finite boxes, at most `u32::MAX / 2` of them, none empty.
     pub(crate) fn new(boxes: &[Aabb<f32>], quality: BuildQuality) -> Self {
+        Self::with(boxes, parameters(quality))
+    }
+
+    /// The same with leaves of one primitive (some may hold a few where boxes coincide): for layouts that make leaves
+    /// of their own.
+    pub(crate) fn single(boxes: &[Aabb<f32>], quality: BuildQuality) -> Self {
+        let parameters = BvhBuildParams {
+            max_prims_per_leaf: 1,
+            post_collapse_reinsertion_batch_ratio_multiplier: 0.0,
+            ..parameters(quality)
+        };
+        Self::with(boxes, parameters)
+    }
+
+    fn with(boxes: &[Aabb<f32>], parameters: BvhBuildParams) -> Self {
         if !stall::stalls(boxes) {
             let items: Vec<obvhs::aabb::Aabb> =
                 boxes.iter().map(|b| obvhs::aabb::Aabb::new(b.min.into(), b.max.into())).collect();
-            let bvh = build_bvh2(&items, parameters(quality), &mut core::time::Duration::default());
+            let bvh = build_bvh2(&items, parameters, &mut core::time::Duration::default());
             return emit::bounded(emit::copy(&bvh), boxes);
         }
         let mut tree = Self::default();

@@ -46,6 +46,13 @@ impl<R: Real> Shear<R> {
         Self { axis, x: x / z, y: y / z }
     }
 
+    /// The shears of the first and second axis, in cyclic order after the one that the ray follows most.
+    #[inline(always)]
+    #[must_use]
+    pub fn slopes(&self) -> (R, R) {
+        (self.x, self.y)
+    }
+
     /// Whether the line through the origin meets the triangle whose vertices are given *relative to the ray's origin*,
     /// and where; whatever the ray parameter is.
     ///

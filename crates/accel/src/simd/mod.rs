@@ -1,0 +1,134 @@
+//! Eight numbers at a time: the only room with `unsafe`.
+//!
+//! [`Lanes`] is what a traversal is written over; [`Portable`] is its meaning, in plain Rust, and every other form must
+//! give the same bits (there is a test), but for [`Lanes::mul_sub`], which may round once or twice and so has its place
+//! in conservative tests only. [`run`] enters a function compiled for a [`Level`], chosen once per query.
+
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+mod portable;
+mod stack;
+
+pub(crate) use portable::Portable;
+pub(crate) use stack::Stack;
+
+/// Which instructions the queries of a scene use. Answers do not depend on it (of [`Precision::Fast`], those at the
+/// very edges of boxes may).
+///
+/// [`Precision::Fast`]: firsthit_geometry::Precision::Fast
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Level {
+    /// What every processor has; the compiler does with it what it can.
+    Scalar,
+    /// AVX2, FMA and BMI2 of x86-64.
+    Avx2,
+}
+
+impl Level {
+    /// Every level, from the least demanding.
+    pub const ALL: [Self; 2] = [Self::Scalar, Self::Avx2];
+
+    /// The best that this processor has.
+    #[must_use]
+    pub fn detect() -> Self {
+        if Self::Avx2.is_available() { Self::Avx2 } else { Self::Scalar }
+    }
+
+    /// Whether this processor has it.
+    #[must_use]
+    pub fn is_available(self) -> bool {
+        match self {
+            Self::Scalar => true,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => {
+                is_x86_feature_detected!("avx2")
+                    && is_x86_feature_detected!("fma")
+                    && is_x86_feature_detected!("bmi1")
+                    && is_x86_feature_detected!("bmi2")
+                    && is_x86_feature_detected!("lzcnt")
+                    && is_x86_feature_detected!("popcnt")
+            }
+            #[cfg(not(target_arch = "x86_64"))]
+            Self::Avx2 => false,
+        }
+    }
+
+    /// The name used on command lines and in reports.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Scalar => "scalar",
+            Self::Avx2 => "avx2",
+        }
+    }
+}
+
+impl core::fmt::Display for Level {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl core::str::FromStr for Level {
+    type Err = String;
+
+    fn from_str(s: &str) -> Result<Self, String> {
+        Self::ALL.into_iter().find(|l| l.name() == s).ok_or_else(|| format!("unknown SIMD level '{s}' (scalar or avx2)"))
+    }
+}
+
+/// Eight `f32`. Comparisons answer with one bit for each lane, false for NaN.
+pub(crate) trait Lanes: Copy {
+    fn splat(x: f32) -> Self;
+    fn load(x: &[f32; 8]) -> Self;
+    fn add(self, o: Self) -> Self;
+    fn sub(self, o: Self) -> Self;
+    fn mul(self, o: Self) -> Self;
+    fn div(self, o: Self) -> Self;
+    /// `self * b - c`, rounded once or twice.
+    fn mul_sub(self, b: Self, c: Self) -> Self;
+    /// The smaller; `o` where one is NaN.
+    fn min(self, o: Self) -> Self;
+    /// The larger; `o` where one is NaN.
+    fn max(self, o: Self) -> Self;
+    fn abs(self) -> Self;
+    /// Lanes where `self <= o`.
+    fn le(self, o: Self) -> u32;
+    /// For each lane in the mask, from the lowest, `bits(self) << 32 | words`. Returns them all at the front of eight;
+    /// what follows is of no use.
+    fn pack(self, words: &[u32; 8], mask: u32) -> [u64; 8];
+}
+
+/// Work that is written once for all levels.
+pub(crate) trait Work {
+    type Output;
+    /// Must be `#[inline(always)]`, and so everything below it that should use the level's instructions.
+    fn run<L: Lanes>(self) -> Self::Output;
+}
+
+/// A level that this processor has.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Available(Level);
+
+impl Available {
+    /// The level wished for, or the best there is below it.
+    pub(crate) fn up_to(level: Level) -> Self {
+        Self(if level.is_available() { level } else { Level::Scalar })
+    }
+
+    pub(crate) fn level(self) -> Level {
+        self.0
+    }
+}
+
+/// Does the work by the instructions of a level.
+#[inline(always)]
+pub(crate) fn run<W: Work>(level: Available, work: W) -> W::Output {
+    match level.0 {
+        // SAFETY: an `Available` is made only of levels that the processor has.
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx2 => unsafe { avx2::run(work) },
+        _ => work.run::<Portable>(),
+    }
+}

@@ -1,0 +1,82 @@
+//! Eight lanes in plain Rust.
+
+use super::Lanes;
+
+/// An array: what the compiler makes of it depends on the target.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(32))]
+pub(crate) struct Portable([f32; 8]);
+
+impl Portable {
+    #[inline(always)]
+    fn zip(self, o: Self, f: impl Fn(f32, f32) -> f32) -> Self {
+        let mut out = self;
+        for k in 0..8 {
+            out.0[k] = f(self.0[k], o.0[k]);
+        }
+        out
+    }
+}
+
+impl Lanes for Portable {
+    #[inline(always)]
+    fn splat(x: f32) -> Self {
+        Self([x; 8])
+    }
+    #[inline(always)]
+    fn load(x: &[f32; 8]) -> Self {
+        Self(*x)
+    }
+    #[inline(always)]
+    fn add(self, o: Self) -> Self {
+        self.zip(o, |a, b| a + b)
+    }
+    #[inline(always)]
+    fn sub(self, o: Self) -> Self {
+        self.zip(o, |a, b| a - b)
+    }
+    #[inline(always)]
+    fn mul(self, o: Self) -> Self {
+        self.zip(o, |a, b| a * b)
+    }
+    #[inline(always)]
+    fn div(self, o: Self) -> Self {
+        self.zip(o, |a, b| a / b)
+    }
+    #[inline(always)]
+    fn mul_sub(self, b: Self, c: Self) -> Self {
+        self.mul(b).sub(c)
+    }
+    #[inline(always)]
+    fn min(self, o: Self) -> Self {
+        self.zip(o, |a, b| if a < b { a } else { b })
+    }
+    #[inline(always)]
+    fn max(self, o: Self) -> Self {
+        self.zip(o, |a, b| if a > b { a } else { b })
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.zip(self, |a, _| a.abs())
+    }
+    #[inline(always)]
+    fn le(self, o: Self) -> u32 {
+        let mut mask = 0;
+        for k in 0..8 {
+            mask |= u32::from(self.0[k] <= o.0[k]) << k;
+        }
+        mask
+    }
+    #[inline(always)]
+    fn pack(self, words: &[u32; 8], mut mask: u32) -> [u64; 8] {
+        let mut out = [0; 8];
+        let mut n = 0;
+        while mask != 0 {
+            let k = mask.trailing_zeros() as usize & 7;
+            out[n & 7] = u64::from(self.0[k].to_bits()) << 32 | u64::from(words[k]);
+            n += 1;
+            mask &= mask - 1;
+        }
+        out
+    }
+}

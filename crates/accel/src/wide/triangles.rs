@@ -1,0 +1,195 @@
+//! Eight triangles at once: which of them the tier's own test must look at.
+//!
+//! A filter may let too many pass, never too few: the decision is the scalar kernel's, and so are its bits.
+
+use firsthit_geometry::triangle::Shear;
+use glam::Vec3;
+
+use crate::layout::wide8::Block;
+use crate::simd::Lanes;
+
+/// Three vertices, coordinates by axis.
+type Corners<L> = [[L; 3]; 3];
+
+/// A filter of blocks for one ray.
+pub(crate) trait Filter<L: Lanes>: Copy {
+    /// One bit for each lane that may be hit; none for lanes that are not used.
+    fn candidates(&self, block: &Block) -> u32;
+}
+
+/// The operations of the watertight test in `f32`, as [`Shear::weights`] does them: the same decision, but for edge
+/// functions that are 0, which pass.
+#[derive(Clone, Copy)]
+pub(crate) struct Sheared<L> {
+    origin: [L; 3],
+    /// The axes of the sheared plane and the one that the ray follows most.
+    axes: [usize; 3],
+    shear: [L; 2],
+    /// How far a sheared coordinate may be off the true ray's, where the decision is to be made for that.
+    off: L,
+}
+
+impl<L: Lanes> Sheared<L> {
+    #[inline(always)]
+    pub(crate) fn new(origin: Vec3, shear: &Shear<f32>, off: f32) -> Self {
+        let axis = shear.axis();
+        let (x, y) = shear.slopes();
+        Self {
+            origin: origin.to_array().map(L::splat),
+            axes: [(axis + 1) % 3, (axis + 2) % 3, axis],
+            shear: [L::splat(x), L::splat(y)],
+            off: L::splat(off),
+        }
+    }
+
+    #[inline(always)]
+    fn corner(&self, block: &Block, vertex: usize) -> [L; 2] {
+        let at = |k: usize| {
+            let axis = self.axes[k] % 3;
+            L::load(&block.0[vertex][axis]).sub(self.origin[axis])
+        };
+        let z = at(2);
+        [at(0).sub(self.shear[0].mul(z)), at(1).sub(self.shear[1].mul(z))]
+    }
+
+    #[inline(always)]
+    fn edges(&self, block: &Block) -> ([L; 3], [[L; 2]; 3]) {
+        let [a, b, c] = [self.corner(block, 0), self.corner(block, 1), self.corner(block, 2)];
+        let edge = |p: [L; 2], q: [L; 2]| p[0].mul(q[1]).sub(p[1].mul(q[0]));
+        ([edge(c, b), edge(a, c), edge(b, a)], [a, b, c])
+    }
+}
+
+impl<L: Lanes> Filter<L> for Sheared<L> {
+    #[inline(always)]
+    fn candidates(&self, block: &Block) -> u32 {
+        let ([e0, e1, e2], _) = self.edges(block);
+        let zero = L::splat(0.0);
+        zero.le(e0.min(e1).min(e2)) | e0.max(e1).max(e2).le(zero)
+    }
+}
+
+/// The same with a margin: everything passes that the unrounded ray may meet.
+#[derive(Clone, Copy)]
+pub(crate) struct Margin<L>(pub(crate) Sheared<L>);
+
+impl<L: Lanes> Filter<L> for Margin<L> {
+    #[inline(always)]
+    fn candidates(&self, block: &Block) -> u32 {
+        let ([e0, e1, e2], corners) = self.0.edges(block);
+        let size = |p: [L; 2]| p[0].abs().max(p[1].abs());
+        let m = size(corners[0]).max(size(corners[1])).max(size(corners[2]));
+        // Coordinates up to m (plus x), each off by x: a product is off by 2mx + x^2, and rounded; two of them.
+        let x = self.0.off;
+        let bound = m.mul(x).mul(L::splat(4.5)).add(x.mul(x).mul(L::splat(3.0))).add(m.mul(m).mul(L::splat(4e-7)));
+        let least = L::splat(0.0).sub(bound);
+        least.le(e0.min(e1).min(e2)) | e0.max(e1).max(e2).le(bound)
+    }
+}
+
+/// The operations of Moeller and Trumbore's test, as `triangle::moeller_trumbore` does them: the same decision.
+#[derive(Clone, Copy)]
+pub(crate) struct Plain<L> {
+    origin: [L; 3],
+    direction: [L; 3],
+}
+
+impl<L: Lanes> Plain<L> {
+    #[inline(always)]
+    pub(crate) fn new(origin: Vec3, direction: Vec3) -> Self {
+        Self { origin: origin.to_array().map(L::splat), direction: direction.to_array().map(L::splat) }
+    }
+}
+
+impl<L: Lanes> Filter<L> for Plain<L> {
+    #[inline(always)]
+    fn candidates(&self, block: &Block) -> u32 {
+        let corners: Corners<L> = [0, 1, 2].map(|v| [0, 1, 2].map(|k| L::load(&block.0[v][k])));
+        let minus = |a: [L; 3], b: [L; 3]| [a[0].sub(b[0]), a[1].sub(b[1]), a[2].sub(b[2])];
+        let cross = |a: [L; 3], b: [L; 3]| {
+            let part = |i: usize, j: usize| a[i].mul(b[j]).sub(b[i].mul(a[j]));
+            [part(1, 2), part(2, 0), part(0, 1)]
+        };
+        let dot = |a: [L; 3], b: [L; 3]| a[0].mul(b[0]).add(a[1].mul(b[1])).add(a[2].mul(b[2]));
+        let (e1, e2) = (minus(corners[1], corners[0]), minus(corners[2], corners[0]));
+        let p = cross(self.direction, e2);
+        let inverse = L::splat(1.0).div(dot(e1, p));
+        let s = minus(self.origin, corners[0]);
+        let u = dot(s, p).mul(inverse);
+        let v = dot(self.direction, cross(s, e1)).mul(inverse);
+        let (zero, one) = (L::splat(0.0), L::splat(1.0));
+        zero.le(u) & zero.le(v) & u.add(v).le(one)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simd::{Available, Level, Work, run};
+    use firsthit_geometry::triangle;
+    use proptest::prelude::*;
+
+    struct Candidates<'a> {
+        block: &'a Block,
+        origin: Vec3,
+        direction: Vec3,
+        off: f32,
+    }
+
+    impl Work for Candidates<'_> {
+        type Output = [u32; 3];
+        #[inline(always)]
+        fn run<L: Lanes>(self) -> [u32; 3] {
+            let sheared = Sheared::<L>::new(self.origin, &Shear::new(self.direction), self.off);
+            [
+                Plain::<L>::new(self.origin, self.direction).candidates(self.block),
+                sheared.candidates(self.block),
+                Margin(sheared).candidates(self.block),
+            ]
+        }
+    }
+
+    fn vector(x: &[f32]) -> Vec3 {
+        Vec3::new(x[0], x[1], x[2])
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2000))]
+
+        /// What the scalar tests accept passes the filters, at every level alike; unused lanes do not.
+        #[test]
+        fn filters_pass_what_the_tests_accept(
+            x in prop::collection::vec(prop_oneof![-1.0f32..1.0, (-2i8..=2).prop_map(f32::from)], 78), used in 0usize..=8
+        ) {
+            let (origin, direction) = (vector(&x[72..]), vector(&x[75..]));
+            prop_assume!(direction != Vec3::ZERO);
+            let mut block = Block([[[f32::NAN; 8]; 3]; 3]);
+            for lane in 0..used {
+                for v in 0..3 {
+                    for k in 0..3 {
+                        block.0[v][k][lane] = x[lane * 9 + v * 3 + k];
+                    }
+                }
+            }
+            let of = |level| run(Available::up_to(level), Candidates { block: &block, origin, direction, off: 1e-5 });
+            let masks = of(Level::Scalar);
+            for level in Level::ALL {
+                prop_assert_eq!(of(level), masks, "{}", level);
+            }
+            let shear = Shear::<f32>::new(direction);
+            let exact = Shear::<f64>::new(direction.as_dvec3());
+            for lane in 0..8 {
+                let passes = masks.map(|m| m >> lane & 1 == 1);
+                if lane >= used {
+                    prop_assert_eq!(passes, [false; 3]);
+                    continue;
+                }
+                let t = block.triangle(lane);
+                let plain = triangle::moeller_trumbore::<f32>(t, origin, direction).is_some();
+                let sheared = shear.weights(t.map(|p| p - origin)).is_some();
+                let double = exact.weights(t.map(|p| p.as_dvec3() - origin.as_dvec3())).is_some();
+                prop_assert!(plain <= passes[0] && sheared <= passes[1] && sheared <= passes[2] && double <= passes[2]);
+            }
+        }
+    }
+}
