@@ -57,8 +57,75 @@ impl<L: Lanes> Boxes<L> {
         };
         let enter = near(0).max(near(1)).max(near(2).max(t_min));
         let leave = far(0).min(far(1)).min(far(2));
-        // Of a missing child the far end is -infinity: there infinity - infinity is NaN, and no hit.
-        let leave = leave.add(leave.abs().mul(self.pad)).min(t_max);
+        // Of a missing child the far end is -infinity, and padded NaN: as the second operand it stays, and is no hit.
+        let leave = t_max.min(leave.add(leave.abs().mul(self.pad)));
         (enter.le(leave), enter)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simd::{Available, Level, Work, run};
+    use firsthit_geometry::Aabb;
+    use proptest::prelude::*;
+
+    struct Test<'a> {
+        node: &'a Node,
+        origin: Vec3,
+        direction: Vec3,
+        padded: bool,
+    }
+
+    impl Work for Test<'_> {
+        type Output = u32;
+        #[inline(always)]
+        fn run<L: Lanes>(self) -> u32 {
+            let delta = if self.padded { self.origin.abs() * 3e-7 + 1e-12 } else { Vec3::ZERO };
+            let boxes = Boxes::<L>::new(self.origin, self.direction, delta, self.padded);
+            boxes.test(self.node, L::splat(0.0), L::splat(f32::INFINITY)).0
+        }
+    }
+
+    fn node(boxes: &[Aabb<f32>]) -> Node {
+        let mut node =
+            Node { planes: [[[f32::INFINITY; 8], [f32::NEG_INFINITY; 8]]; 3], children: [u32::MAX; 8] };
+        for (k, b) in boxes.iter().enumerate() {
+            for axis in 0..3 {
+                node.planes[axis][0][k] = b.min[axis];
+                node.planes[axis][1][k] = b.max[axis];
+            }
+        }
+        node
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(4000))]
+
+        /// A box that the ray meets exactly is never missed when padded; a child that is missing is never met; a ray
+        /// may run along the axes and in the planes of the boxes.
+        #[test]
+        fn boxes_that_are_met_are_found(
+            corner in prop::array::uniform3(-4i32..=4), size in prop::array::uniform3(0i32..=3),
+            target in prop::array::uniform3(0i32..=4), o in prop::array::uniform3(-40i32..=40), scale in -8i32..8, used in 0usize..=8,
+        ) {
+            let v = |a: [i32; 3]| Vec3::new(a[0] as f32, a[1] as f32, a[2] as f32);
+            let b = Aabb::new(v(corner), v(corner) + v(size));
+            // On quarters of integers the target is exact.
+            let p = b.min + v(size) * v(target) / 4.0;
+            let origin = v(o);
+            prop_assume!(p != origin);
+            // Another length rounds the direction; powers of two don't.
+            let direction = (p - origin) * 2f32.powi(scale);
+            let node = node(&vec![b; used]);
+            let all = (1u32 << used) - 1;
+            for level in Level::ALL {
+                for padded in [true, false] {
+                    let hits = run(Available::up_to(level), Test { node: &node, origin, direction, padded });
+                    prop_assert_eq!(hits & !all, 0, "{} missing children are met", level);
+                    prop_assert!(!padded || hits == all, "{} {:b}", level, hits);
+                }
+            }
+        }
     }
 }
