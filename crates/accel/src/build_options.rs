@@ -2,7 +2,7 @@
 
 use firsthit_geometry::Precision;
 
-use crate::Guards;
+use crate::{Guards, Level};
 
 /// How much time a build may take for a better tree.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -20,14 +20,25 @@ pub enum BuildQuality {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Layout {
-    /// Binary tree: simple and portable.
+    /// Binary tree: simple and portable. It also stands in for meshes that others cannot hold: those with shapes.
     #[default]
     Bvh2,
+    /// Eight children a node and eight triangles a block, tested eight at a time.
+    Wide8,
 }
 
 impl Layout {
     /// All layouts: tests and benches loop over them.
-    pub const ALL: [Self; 1] = [Self::Bvh2];
+    pub const ALL: [Self; 2] = [Self::Bvh2, Self::Wide8];
+
+    /// The name used on command lines and in reports.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Bvh2 => "bvh2",
+            Self::Wide8 => "wide8",
+        }
+    }
 }
 
 /// How a scene is built. The default is what most users want.
@@ -39,6 +50,8 @@ pub struct BuildOptions {
     pub quality: BuildQuality,
     /// Memory layout.
     pub layout: Layout,
+    /// The most demanding instructions that queries may use, if the processor has them.
+    pub simd: Level,
     /// Which guards the robust tier has: all, but in measurements.
     pub guards: Guards,
 }

@@ -8,6 +8,8 @@ use firsthit_geometry::{
 use glam::{DVec3, Vec3};
 
 use crate::local::LocalRay;
+use crate::simd::Lanes;
+use crate::wide::{Either, Filter, Margin, Plain, Sheared};
 
 // Written out: `map` on arrays is not always inlined.
 
@@ -46,7 +48,10 @@ pub(crate) trait Kernel {
     const CLAMPED: bool;
     /// What is prepared once per ray and instance.
     type Setup;
+    /// Picks from eight triangles those that are worth a test.
+    type Filter<L: Lanes>: Filter<L>;
     fn setup(ray: &LocalRay) -> Self::Setup;
+    fn filter<L: Lanes>(setup: &Self::Setup, ray: &LocalRay) -> Self::Filter<L>;
     /// The hit, if there is one; beyond `t_max` it is not wanted, but may be given.
     fn test(setup: &Self::Setup, ray: &LocalRay, vertices: &[Vec3; 3], t_max: f64) -> Option<Found>;
     /// The same if the triangle answers for the crossing, see [`crate::Crossings::Surfaces`].
@@ -63,9 +68,15 @@ impl Kernel for Fast {
     const PADDED: bool = false;
     const CLAMPED: bool = false;
     type Setup = ();
+    type Filter<L: Lanes> = Plain<L>;
 
     #[inline(always)]
     fn setup(_: &LocalRay) {}
+
+    #[inline(always)]
+    fn filter<L: Lanes>((): &(), ray: &LocalRay) -> Plain<L> {
+        Plain::new(ray.origin32, ray.direction32)
+    }
 
     #[inline(always)]
     fn test((): &(), ray: &LocalRay, vertices: &[Vec3; 3], _: f64) -> Option<Found> {
@@ -84,10 +95,19 @@ impl<const PADDING: bool, const WATERTIGHT: bool, const FALLBACK: bool, const PL
     const PADDED: bool = PADDING;
     const CLAMPED: bool = PADDING;
     type Setup = Shear<f32>;
+    type Filter<L: Lanes> = Either<L, WATERTIGHT>;
 
     #[inline(always)]
     fn setup(ray: &LocalRay) -> Shear<f32> {
         Shear::new(ray.direction32)
+    }
+
+    #[inline(always)]
+    fn filter<L: Lanes>(shear: &Shear<f32>, ray: &LocalRay) -> Either<L, WATERTIGHT> {
+        Either {
+            plain: Plain::new(ray.origin32, ray.direction32),
+            sheared: Sheared::new(ray.origin32, shear, 0.0),
+        }
     }
 
     #[inline(always)]
@@ -137,6 +157,14 @@ fn crossing(vertices: &[Vec3; 3], ray: &LocalRay, u: f64, v: f64) -> f64 {
     })
 }
 
+/// What the unrounded ray may meet, by the ray as rounded to `f32`.
+#[inline(always)]
+fn margin<L: Lanes>(ray: &LocalRay) -> Margin<L> {
+    // A sheared coordinate takes in the errors of two axes; the rest is for the rounding of this line.
+    let off = (ray.reach().max_element() * 2.1) as f32;
+    Margin(Sheared::new(ray.origin32, &Shear::new(ray.direction32), off))
+}
+
 /// Tier `Double`: the same in `f64`, with the unrounded ray.
 pub(crate) struct Double;
 
@@ -144,10 +172,16 @@ impl Kernel for Double {
     const PADDED: bool = true;
     const CLAMPED: bool = true;
     type Setup = Shear<f64>;
+    type Filter<L: Lanes> = Margin<L>;
 
     #[inline(always)]
     fn setup(ray: &LocalRay) -> Shear<f64> {
         Shear::new(ray.direction)
+    }
+
+    #[inline(always)]
+    fn filter<L: Lanes>(_: &Shear<f64>, ray: &LocalRay) -> Margin<L> {
+        margin(ray)
     }
 
     #[inline(always)]
@@ -177,6 +211,12 @@ impl Kernel for Exact {
     const PADDED: bool = true;
     const CLAMPED: bool = false;
     type Setup = Option<ExactRay>;
+    type Filter<L: Lanes> = Margin<L>;
+
+    #[inline(always)]
+    fn filter<L: Lanes>(_: &Option<ExactRay>, ray: &LocalRay) -> Margin<L> {
+        margin(ray)
+    }
 
     #[inline(always)]
     fn setup(ray: &LocalRay) -> Option<ExactRay> {

@@ -56,5 +56,6 @@ pub use guards::Guards;
 pub use hit::{Hit, HitId, SurfacePoint, TraversalCounts};
 pub use query::{Crossings, HitLists};
 pub use scene::{Scene, SceneStats};
+pub use simd::Level;
 #[doc(hidden)]
 pub use visit_order::VisitOrder;

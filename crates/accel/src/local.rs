@@ -28,8 +28,8 @@ const FAR: f64 = 8.0;
 /// Half the difference between an object's box and the box that is put into the tree over instances, in each axis: more
 /// than any [`LocalRay::reach`].
 pub(crate) fn instance_padding(bounds: &Aabb<f64>) -> DVec3 {
-    // R <= (FAR + 1) half sizes; |o| <= |center| + FAR half sizes; 10 uR + 3u|o| <= 114 u half + 3u|center|.
-    DVec3::splat(half_size(bounds) * 128.0 * U) + bounds.center().abs() * (4.0 * U) + TINY
+    // R <= (FAR + 1) half sizes; |o| <= |center| + FAR half sizes; 10 uR + 5u|o| <= 130 u half + 5u|center|.
+    DVec3::splat(half_size(bounds) * 144.0 * U) + bounds.center().abs() * (6.0 * U) + TINY
 }
 
 /// In units of a normalised object, of size near 1: covers directions so small that their rounding to `f32` is not
@@ -120,8 +120,15 @@ impl LocalRay {
         if !PADDED {
             return slabs;
         }
-        // Two more u|o| for rounding the origin and adding `delta` to it; 2uR to be above `reach` whatever rounds.
-        slabs.widened((self.moved.abs() * (3.0 * U) + (10.0 * U * self.farthest + self.off + TINY)).as_vec3())
+        slabs.widened(self.delta())
+    }
+
+    /// By how much, in each axis, boxes are met as if larger: more than [`LocalRay::reach`].
+    #[inline(always)]
+    pub(crate) fn delta(&self) -> Vec3 {
+        // Four more u|o|: for rounding the origin, adding this to it, multiplying it with the reciprocal (where the
+        // test does so), and to spare; 2uR to be above `reach` whatever rounds.
+        (self.moved.abs() * (5.0 * U) + (10.0 * U * self.farthest + self.off + TINY)).as_vec3()
     }
 
     /// A parameter of the world's ray as the start of the box tests' interval: not above it.

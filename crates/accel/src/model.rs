@@ -9,22 +9,24 @@ use glam::{DVec3, Vec3};
 use crate::build::Topology;
 use crate::kernel::{Found, Kernel, double};
 use crate::layout::Bvh2;
+use crate::layout::wide8::Wide8;
 use crate::local::{Extent, LocalRay};
 use crate::normalise::common_scale;
 use crate::query::{Candidate, Collector};
+use crate::simd::{self, Available, Lanes, Work};
 use crate::stats::Probe;
 use crate::traverse::traverse;
-use crate::{BuildError, BuildOptions, Geometry};
+use crate::wide::{self, BoxRay};
+use crate::{BuildError, BuildOptions, Geometry, Layout};
 
 /// The parts of one mesh, ready to be traced.
 #[derive(Clone, Debug)]
 pub(crate) struct Model {
-    tree: Bvh2<f32>,
-    depth: u32,
-    /// Triangles in the order of the leaves, divided by `scale`. At the place of a shape there is nothing of use.
-    triangles: Vec<[Vec3; 3]>,
-    /// What lies at each place of the leaves.
-    ids: Vec<PrimitiveId>,
+    tree: MeshTree,
+    /// What lies at each place of the leaves: its number among all primitives in the caller's order.
+    numbers: Vec<u32>,
+    /// Number of the first primitive of each geometry.
+    firsts: Vec<u32>,
     /// Place of each primitive of each geometry.
     places: Vec<Places>,
     shapes: Vec<ModelShape>,
@@ -36,6 +38,21 @@ pub(crate) struct Model {
     bounds: Aabb<f64>,
     extent: Extent,
     degenerate: u64,
+}
+
+/// The tree with its triangles, which lie in the order of the leaves, divided by the model's scale.
+#[derive(Clone, Debug)]
+enum MeshTree {
+    Binary {
+        tree: Bvh2<f32>,
+        /// At the place of a shape there is nothing of use.
+        triangles: Vec<[Vec3; 3]>,
+        depth: u32,
+    },
+    Wide {
+        tree: Wide8,
+        level: Available,
+    },
 }
 
 /// A primitive of a mesh.
@@ -81,10 +98,9 @@ impl Model {
         let normalised = |p: Vec3| (p.as_dvec3() / scale).as_vec3();
 
         let mut model = Self {
-            tree: Bvh2::new(&Topology::default(), &[]),
-            depth: 0,
-            triangles: Vec::new(),
-            ids: Vec::new(),
+            tree: MeshTree::Binary { tree: Bvh2::new(&Topology::default(), &[]), triangles: Vec::new(), depth: 0 },
+            numbers: Vec::new(),
+            firsts: Vec::new(),
             places: Vec::new(),
             shapes: Vec::new(),
             unbounded: Vec::new(),
@@ -96,9 +112,11 @@ impl Model {
         // Everything in file order first.
         let mut triangles = Vec::new();
         let mut boxes = Vec::new();
-        let mut ids = Vec::new();
+        let mut numbers = Vec::new();
+        let mut first = 0;
         for (g, geometry) in geometries.iter().enumerate() {
             let g = g as u32;
+            model.firsts.push(first);
             match geometry {
                 Geometry::Triangles { positions, triangles: indices } => {
                     model.places.push(Places::Triangles(vec![u32::MAX; indices.len()]));
@@ -116,8 +134,9 @@ impl Model {
                         }
                         triangles.push(vertices);
                         boxes.push(Aabb::from_points(vertices));
-                        ids.push(PrimitiveId { geometry: g, primitive: k as u32 });
+                        numbers.push(first + k as u32);
                     }
+                    first += indices.len() as u32;
                 }
                 Geometry::Shape(shape) => {
                     let index = model.shapes.len() as u32;
@@ -127,22 +146,40 @@ impl Model {
                     if bounds.is_finite() {
                         triangles.push([Vec3::ZERO; 3]);
                         boxes.push(bounds.to_f32_outward());
-                        ids.push(PrimitiveId { geometry: g, primitive: 0 });
+                        numbers.push(first);
                     } else {
                         model.unbounded.push(index);
                     }
                     model.shapes.push(ModelShape { geometry: g, shape: shape.clone(), bounds, scale });
+                    first += 1;
                 }
             }
         }
         model.bounds = boxes.iter().fold(Aabb::empty(), |a, b| a.union(*b)).to_f64();
         model.extent = Extent::new(&model.bounds);
-        let topology = Topology::new(&near_one(&boxes, &model.bounds), options.quality);
-        model.tree = Bvh2::new(&topology, &boxes);
-        model.depth = topology.depth();
-        model.triangles = topology.order.iter().map(|&i| triangles[i as usize]).collect();
-        model.ids = topology.order.iter().map(|&i| ids[i as usize]).collect();
-        for (place, id) in model.ids.iter().enumerate() {
+        let small = model.bounds.is_empty() || model.bounds.min.abs().max(model.bounds.max.abs()).max_element() < 4.0;
+        // Shapes have no place in blocks of triangles; and products of three large numbers would overflow there.
+        let layout = if model.shapes.is_empty() && small { options.layout } else { Layout::Bvh2 };
+        let number = |&i: &u32| numbers.get(i as usize).copied().unwrap_or(u32::MAX);
+        match layout {
+            Layout::Bvh2 => {
+                let topology = Topology::new(&near_one(&boxes, &model.bounds), options.quality);
+                model.numbers = topology.order.iter().map(number).collect();
+                model.tree = MeshTree::Binary {
+                    tree: Bvh2::new(&topology, &boxes),
+                    triangles: topology.order.iter().map(|&i| triangles[i as usize]).collect(),
+                    depth: topology.depth(),
+                };
+            }
+            Layout::Wide8 => {
+                let topology = Topology::single(&boxes, options.quality);
+                let (tree, order) = Wide8::new(&topology, &triangles, &boxes);
+                model.numbers = order.iter().map(number).collect();
+                model.tree = MeshTree::Wide { tree, level: Available::up_to(options.simd) };
+            }
+        }
+        for place in 0..model.numbers.len() {
+            let Some(id) = model.id(place) else { continue };
             if let Places::Triangles(places) = &mut model.places[id.geometry as usize] {
                 places[id.primitive as usize] = place as u32;
             }
@@ -162,10 +199,16 @@ impl Model {
         &self.extent
     }
     pub(crate) fn depth(&self) -> u32 {
-        self.depth
+        match &self.tree {
+            MeshTree::Binary { depth, .. } => *depth,
+            MeshTree::Wide { tree, .. } => tree.depth(),
+        }
     }
     pub(crate) fn sah_cost(&self) -> f64 {
-        self.tree.sah_cost()
+        match &self.tree {
+            MeshTree::Binary { tree, .. } => tree.sah_cost(),
+            MeshTree::Wide { tree, .. } => tree.sah_cost(),
+        }
     }
     pub(crate) fn degenerate(&self) -> u64 {
         self.degenerate
@@ -179,9 +222,11 @@ impl Model {
     }
     /// Memory of tree and primitives.
     pub(crate) fn bytes(&self) -> usize {
-        self.tree.bytes()
-            + size_of_val(self.triangles.as_slice())
-            + size_of_val(self.ids.as_slice())
+        let tree = match &self.tree {
+            MeshTree::Binary { tree, triangles, .. } => tree.bytes() + size_of_val(triangles.as_slice()),
+            MeshTree::Wide { tree, .. } => tree.bytes(),
+        };
+        tree + size_of_val(self.numbers.as_slice())
             + self.triangle_count() as usize * size_of::<u32>()
             + size_of_val(self.shapes.as_slice())
     }
@@ -189,11 +234,9 @@ impl Model {
     /// Everything in the tree: normalised vertices of triangles, or the box of a shape.
     pub(crate) fn extremes(&self) -> impl Iterator<Item = DVec3> + '_ {
         let corners = self.shapes.iter().filter(|s| s.bounds.is_finite()).flat_map(|s| s.bounds.corners());
-        self.triangles
-            .iter()
-            .zip(&self.ids)
-            .filter(|(_, id)| matches!(self.places[id.geometry as usize], Places::Triangles(_)))
-            .flat_map(|(t, _)| t.map(|v| v.as_dvec3()))
+        self.surfaces()
+            .filter_map(|(_, surface)| if let Surface::Triangle(v) = surface { Some(v) } else { None })
+            .flatten()
             .chain(corners)
     }
 
@@ -208,12 +251,33 @@ impl Model {
         })
     }
 
+    /// The triangle at a place of the leaves.
+    fn triangle(&self, place: usize) -> Option<[Vec3; 3]> {
+        match &self.tree {
+            MeshTree::Binary { triangles, .. } => triangles.get(place).copied(),
+            MeshTree::Wide { tree, .. } => tree.triangle(place),
+        }
+    }
+
+    /// What lies at a place of the leaves; `None` where nothing does.
+    #[inline(always)]
+    fn id(&self, place: usize) -> Option<PrimitiveId> {
+        let number = *self.numbers.get(place)?;
+        if number == u32::MAX {
+            return None;
+        }
+        // Most meshes have one geometry.
+        let after = if self.firsts.len() == 1 { 1 } else { self.firsts.partition_point(|&f| f <= number) };
+        let geometry = after.checked_sub(1)?;
+        Some(PrimitiveId { geometry: geometry as u32, primitive: number - self.firsts[geometry] })
+    }
+
     /// The surface with this id.
     pub(crate) fn surface(&self, id: PrimitiveId) -> Option<Surface<'_>> {
         match self.places.get(id.geometry as usize)? {
             Places::Triangles(places) => {
                 let place = *places.get(id.primitive as usize)?;
-                Some(Surface::Triangle(double(self.triangles.get(place as usize)?)))
+                Some(Surface::Triangle(double(&self.triangle(place as usize)?)))
             }
             Places::Shape(index) => self.shapes.get(*index as usize).map(Surface::Shape),
         }
@@ -229,61 +293,55 @@ impl Model {
         collector: &mut C,
         probe: &mut P,
     ) -> ControlFlow<()> {
-        // Meshes of triangles alone, nearly all, pay nothing for shapes.
-        if self.shapes.is_empty() {
-            self.trace_tree::<SURFACES, false, K, C, P>(ray, instance, precision, collector, probe)
-        } else {
-            self.trace_tree::<SURFACES, true, K, C, P>(ray, instance, precision, collector, probe)
+        match &self.tree {
+            MeshTree::Wide { tree, level } => {
+                let offer = OfferTriangle::<SURFACES, K>::new(self, ray, instance, collector);
+                simd::run(*level, TraceWide { tree, offer, collector, probe })
+            }
+            // Meshes of triangles alone, nearly all, pay nothing for shapes.
+            MeshTree::Binary { tree, triangles, .. } if self.shapes.is_empty() => {
+                self.trace_binary::<SURFACES, false, K, C, P>(tree, triangles, ray, instance, precision, collector, probe)
+            }
+            MeshTree::Binary { tree, triangles, .. } => {
+                self.trace_binary::<SURFACES, true, K, C, P>(tree, triangles, ray, instance, precision, collector, probe)
+            }
         }
     }
 
     /// A function of its own, so that its loop has the registers.
     #[inline(never)]
-    fn trace_tree<const SURFACES: bool, const SHAPES: bool, K: Kernel, C: Collector + ?Sized, P: Probe>(
+    fn trace_binary<const SURFACES: bool, const SHAPES: bool, K: Kernel, C: Collector + ?Sized, P: Probe>(
         &self,
+        tree: &Bvh2<f32>,
+        triangles: &[[Vec3; 3]],
         ray: &LocalRay,
         instance: u32,
         precision: Precision,
         collector: &mut C,
         probe: &mut P,
     ) -> ControlFlow<()> {
-        let setup = K::setup(ray);
+        let mut offer = OfferTriangle::<SURFACES, K>::new(self, ray, instance, collector);
         let t_min = ray.box_t_min(collector.t_min());
         let t_max = ray.box_t_max(collector.t_max());
         let mut end = t_max;
-        let mut limit = collector.t_max() * ray.t_scale;
         let leaf = |range: Range<usize>, probe: &mut P| {
-            let mut taken = false;
             for place in range {
                 probe.primitive();
-                if SHAPES && let Some(Places::Shape(index)) = self.places.get(self.ids[place].geometry as usize) {
-                    taken |= self.offer_shape::<C>(*index, ray, instance, precision, K::CLAMPED, collector)?;
-                    continue;
+                let shape = || self.places.get(self.id(place)?.geometry as usize);
+                if SHAPES && let Some(Places::Shape(index)) = shape() {
+                    if self.offer_shape::<C>(*index, ray, instance, precision, K::CLAMPED, collector)? {
+                        end = offer.shortened(collector);
+                    }
+                } else if let Some(shorter) = offer.offer(place, &triangles[place], collector, probe)? {
+                    end = shorter;
                 }
-                let found = if SURFACES {
-                    K::crosses(&setup, ray, &self.triangles[place], limit)
-                } else {
-                    K::test(&setup, ray, &self.triangles[place], limit)
-                };
-                let Some(Found { t, u, v, fallback }) = found else { continue };
-                if fallback {
-                    probe.fallback();
-                }
-                let t = if K::CLAMPED { within_triangle(ray, t, &self.triangles[place]) } else { Some(t) };
-                let Some(t) = t else { continue };
-                let PrimitiveId { geometry, primitive } = self.ids[place];
-                taken |= collector.offer(Candidate::new(instance, geometry, primitive, t / ray.t_scale, u, v))?;
-            }
-            if taken {
-                end = ray.box_t_max(collector.t_max());
-                limit = collector.t_max() * ray.t_scale;
             }
             ControlFlow::Continue(end)
         };
         if K::PADDED {
-            traverse::<true, _, _, _>(&self.tree, &ray.slabs::<true>(), t_min, t_max, probe, leaf)
+            traverse::<true, _, _, _>(tree, &ray.slabs::<true>(), t_min, t_max, probe, leaf)
         } else {
-            traverse::<false, _, _, _>(&self.tree, &ray.slabs::<false>(), t_min, t_max, probe, leaf)
+            traverse::<false, _, _, _>(tree, &ray.slabs::<false>(), t_min, t_max, probe, leaf)
         }
     }
 
@@ -347,6 +405,91 @@ impl ModelShape {
     /// Whether no straight ray that leaves it can come back.
     pub(crate) fn is_flat(&self) -> bool {
         self.shape.is_flat()
+    }
+}
+
+/// Tests triangles for one ray, and offers what is hit.
+struct OfferTriangle<'a, const SURFACES: bool, K: Kernel> {
+    model: &'a Model,
+    ray: &'a LocalRay,
+    instance: u32,
+    setup: K::Setup,
+    /// End of the interval in the instance's space.
+    limit: f64,
+}
+
+impl<'a, const SURFACES: bool, K: Kernel> OfferTriangle<'a, SURFACES, K> {
+    #[inline(always)]
+    fn new<C: Collector + ?Sized>(model: &'a Model, ray: &'a LocalRay, instance: u32, collector: &C) -> Self {
+        Self { model, ray, instance, setup: K::setup(ray), limit: collector.t_max() * ray.t_scale }
+    }
+
+    /// The new end of the boxes' interval if the hit was taken.
+    #[inline(always)]
+    fn offer<C: Collector + ?Sized, P: Probe>(
+        &mut self,
+        place: usize,
+        triangle: &[Vec3; 3],
+        collector: &mut C,
+        probe: &mut P,
+    ) -> ControlFlow<(), Option<f32>> {
+        let found = if SURFACES {
+            K::crosses(&self.setup, self.ray, triangle, self.limit)
+        } else {
+            K::test(&self.setup, self.ray, triangle, self.limit)
+        };
+        let Some(Found { t, u, v, fallback }) = found else { return ControlFlow::Continue(None) };
+        if fallback {
+            probe.fallback();
+        }
+        let t = if K::CLAMPED { within_triangle(self.ray, t, triangle) } else { Some(t) };
+        let (Some(t), Some(id)) = (t, self.model.id(place)) else { return ControlFlow::Continue(None) };
+        let t = t / self.ray.t_scale;
+        let taken = collector.offer(Candidate::new(self.instance, id.geometry, id.primitive, t, u, v))?;
+        ControlFlow::Continue(taken.then(|| self.shortened(collector)))
+    }
+
+    /// The end of the boxes' interval, now that a hit was taken.
+    #[inline(always)]
+    fn shortened<C: Collector + ?Sized>(&mut self, collector: &C) -> f32 {
+        self.limit = collector.t_max() * self.ray.t_scale;
+        self.ray.box_t_max(collector.t_max())
+    }
+}
+
+/// Traversal of the wide tree.
+struct TraceWide<'a, const SURFACES: bool, K: Kernel, C: ?Sized, P> {
+    tree: &'a Wide8,
+    offer: OfferTriangle<'a, SURFACES, K>,
+    collector: &'a mut C,
+    probe: &'a mut P,
+}
+
+impl<const SURFACES: bool, K: Kernel, C: Collector + ?Sized, P: Probe> Work for TraceWide<'_, SURFACES, K, C, P> {
+    type Output = ControlFlow<()>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> ControlFlow<()> {
+        let Self { tree, mut offer, collector, probe } = self;
+        let ray = offer.ray;
+        let filter = K::filter::<L>(&offer.setup, ray);
+        let boxes = BoxRay {
+            origin: ray.origin32,
+            direction: ray.direction32,
+            delta: if K::PADDED { ray.delta() } else { Vec3::ZERO },
+            padded: K::PADDED,
+            t_min: ray.box_t_min(collector.t_min()),
+            t_max: ray.box_t_max(collector.t_max()),
+        };
+        if collector.ordered() {
+            wide::traverse::<L, _, P, true>(tree, &boxes, &filter, probe, |place, triangle, probe| {
+                offer.offer(place, &triangle, collector, probe)
+            })
+        } else {
+            wide::traverse::<L, _, P, false>(tree, &boxes, &filter, probe, |place, triangle, probe| {
+                offer.offer(place, &triangle, collector, probe)
+            })
+        }
     }
 }
 

@@ -17,9 +17,9 @@ pub(crate) trait Probe {
     /// A hit needed more than `f64`.
     #[inline(always)]
     fn fallback(&mut self) {}
-    /// A block of primitives was tested; `u32::MAX` stands for none.
+    /// A block of so many primitives was tested.
     #[inline(always)]
-    fn block(&mut self, _primitives: &[u32]) {}
+    fn block(&mut self, _count: impl FnOnce() -> u32) {}
 }
 
 /// Watches nothing.
@@ -40,9 +40,8 @@ impl Probe for TraversalCounts {
         self.fallbacks = self.fallbacks.saturating_add(1);
     }
     #[inline(always)]
-    fn block(&mut self, primitives: &[u32]) {
-        let used = primitives.iter().filter(|&&p| p != u32::MAX).count();
-        self.primitives = self.primitives.saturating_add(used as u32);
+    fn block(&mut self, count: impl FnOnce() -> u32) {
+        self.primitives = self.primitives.saturating_add(count());
     }
 }
 

@@ -16,8 +16,6 @@ pub(crate) struct Wide8 {
     pub(crate) root: Reference,
     pub(crate) nodes: Vec<Node>,
     pub(crate) blocks: Vec<Block>,
-    /// Which primitive is in each lane of each block; `u32::MAX` in those not used.
-    pub(crate) order: Vec<u32>,
     depth: u32,
     sah_cost: f64,
 }
@@ -71,6 +69,13 @@ impl Block {
     }
 }
 
+impl Block {
+    /// Lanes that are used.
+    pub(crate) fn count(&self) -> u32 {
+        self.0[0][0].iter().filter(|x| !x.is_nan()).count() as u32
+    }
+}
+
 /// Triangles in a leaf at most.
 const LEAF: u32 = 8;
 /// Cost of testing a block against that of a node.
@@ -95,23 +100,25 @@ struct Collapse<'a> {
 
 impl Wide8 {
     /// Collapses a binary tree whose leaves hold one primitive each (or few).
-    pub(crate) fn new(topology: &Topology, triangles: &[[Vec3; 3]], boxes: &[Aabb<f32>]) -> Self {
+    ///
+    /// Tells also which triangle is in each lane of each block; `u32::MAX` stands for none.
+    pub(crate) fn new(topology: &Topology, triangles: &[[Vec3; 3]], boxes: &[Aabb<f32>]) -> (Self, Vec<u32>) {
         let collapse = Collapse::new(topology, boxes);
         let mut tree = Self {
             root: Reference::NOTHING,
             nodes: Vec::new(),
             blocks: Vec::new(),
-            order: Vec::new(),
             depth: 0,
             sah_cost: 0.0,
         };
+        let mut order = Vec::new();
         if let Some(root) = topology.root {
-            tree.root = tree.emit(&collapse, root, triangles, 1);
+            tree.root = tree.emit(&collapse, root, triangles, 1, &mut order);
             let whole = f64::from(collapse.bounds(root).area());
             let plan = collapse.plan(root);
             tree.sah_cost = if whole > 0.0 { f64::from(plan.cost[0]) / whole } else { 1.0 };
         }
-        tree
+        (tree, order)
     }
 
     /// Expected number of nodes and blocks that a random line through the root's box meets.
@@ -126,7 +133,7 @@ impl Wide8 {
 
     /// Memory of nodes and blocks.
     pub(crate) fn bytes(&self) -> usize {
-        size_of_val(self.nodes.as_slice()) + size_of_val(self.blocks.as_slice()) + size_of_val(self.order.as_slice())
+        size_of_val(self.nodes.as_slice()) + size_of_val(self.blocks.as_slice())
     }
 
     /// The triangle at a place, `8 * block + lane`.
@@ -135,10 +142,18 @@ impl Wide8 {
     }
 
     /// Writes the subtree and says where it is. Recursion is as deep as the tree, which is bounded.
-    fn emit(&mut self, c: &Collapse<'_>, at: Child, triangles: &[[Vec3; 3]], depth: u32) -> Reference {
+    fn emit(
+        &mut self,
+        c: &Collapse<'_>,
+        at: Child,
+        triangles: &[[Vec3; 3]],
+        depth: u32,
+        order: &mut Vec<u32>,
+    ) -> Reference {
         self.depth = self.depth.max(depth);
         if at.is_leaf() || c.plan(at).left[0] == 0 {
-            return self.emit_leaf(c.run(at), &c.topology.order, triangles);
+            let (first, count) = c.run(at);
+            return self.emit_leaf(&c.topology.order[first as usize..(first + count) as usize], triangles, order);
         }
         let mut children = Vec::with_capacity(8);
         let [l, r] = c.topology.nodes[at.first as usize];
@@ -158,18 +173,18 @@ impl Wide8 {
                 self.nodes[index].planes[axis][0][k] = b.min[axis];
                 self.nodes[index].planes[axis][1][k] = b.max[axis];
             }
-            let reference = self.emit(c, child, triangles, depth + 1);
+            let reference = self.emit(c, child, triangles, depth + 1, order);
             self.nodes[index].children[k] = reference.0;
         }
         Reference::node(index)
     }
 
-    fn emit_leaf(&mut self, (first, count): (u32, u32), order: &[u32], triangles: &[[Vec3; 3]]) -> Reference {
+    fn emit_leaf(&mut self, run: &[u32], triangles: &[[Vec3; 3]], order: &mut Vec<u32>) -> Reference {
         let index = self.blocks.len();
         let mut block = Block([[[f32::NAN; 8]; 3]; 3]);
         for lane in 0..8 {
-            let primitive = if (lane as u32) < count { order[first as usize + lane] } else { u32::MAX };
-            self.order.push(primitive);
+            let primitive = run.get(lane).copied().unwrap_or(u32::MAX);
+            order.push(primitive);
             if let Some(triangle) = triangles.get(primitive as usize) {
                 for (vertex, p) in triangle.iter().enumerate() {
                     for axis in 0..3 {
@@ -274,19 +289,19 @@ mod tests {
     fn check(triangles: &[[Vec3; 3]]) {
         let boxes: Vec<_> = triangles.iter().map(|t| Aabb::from_points(*t)).collect();
         let topology = Topology::single(&boxes, BuildQuality::Balanced);
-        let tree = Wide8::new(&topology, triangles, &boxes);
-        let mut seen: Vec<u32> = tree.order.iter().copied().filter(|&p| p != u32::MAX).collect();
+        let (tree, order) = Wide8::new(&topology, triangles, &boxes);
+        let mut seen: Vec<u32> = order.iter().copied().filter(|&p| p != u32::MAX).collect();
         seen.sort_unstable();
         assert_eq!(seen, (0..triangles.len() as u32).collect::<Vec<_>>(), "every triangle in one lane");
-        for (place, &p) in tree.order.iter().enumerate() {
+        for (place, &p) in order.iter().enumerate() {
             let t = tree.triangle(place).unwrap();
             assert_eq!(triangles.get(p as usize).copied(), (!t[0].x.is_nan()).then_some(t));
         }
         // Boxes of children hold what lies below.
-        fn below(tree: &Wide8, r: Reference) -> Aabb<f32> {
+        fn below(tree: &Wide8, order: &[u32], r: Reference) -> Aabb<f32> {
             if r.is_leaf() {
                 let places = r.index() * 8..r.index() * 8 + 8;
-                let used = places.filter(|&k| tree.order[k] != u32::MAX);
+                let used = places.filter(|&k| order[k] != u32::MAX);
                 return Aabb::from_points(used.flat_map(|k| tree.triangle(k).unwrap()));
             }
             let node = &tree.nodes[r.index()];
@@ -294,13 +309,13 @@ mod tests {
             for k in (0..8).filter(|&k| node.children[k] != u32::MAX) {
                 let [x, y, z] = node.planes.map(|p| [p[0][k], p[1][k]]);
                 let b = Aabb::new(Vec3::new(x[0], y[0], z[0]), Vec3::new(x[1], y[1], z[1]));
-                assert_eq!(b, below(tree, Reference(node.children[k])));
+                assert_eq!(b, below(tree, order, Reference(node.children[k])));
                 all = all.union(b);
             }
             all
         }
         if tree.root != Reference::NOTHING {
-            below(&tree, tree.root);
+            below(&tree, &order, tree.root);
         }
         if triangles.len() > 100 {
             let filled = triangles.len() as f64 / tree.blocks.len() as f64;

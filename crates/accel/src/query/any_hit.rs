@@ -31,4 +31,8 @@ impl<F: FnMut(&Hit) -> bool> Collector for Any<F> {
             ControlFlow::Continue(false)
         }
     }
+    #[inline(always)]
+    fn ordered(&self) -> bool {
+        false
+    }
 }

@@ -38,4 +38,8 @@ pub(crate) trait Collector {
     /// Takes a hit or not (then the interval may have become shorter, and of a shape no farther root is wanted); breaks
     /// when nothing more is wanted.
     fn offer(&mut self, hit: Candidate) -> ControlFlow<(), bool>;
+    /// Whether finding near hits first helps.
+    fn ordered(&self) -> bool {
+        true
+    }
 }

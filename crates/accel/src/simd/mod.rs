@@ -16,24 +16,19 @@ pub(crate) use stack::Stack;
 /// very edges of boxes may).
 ///
 /// [`Precision::Fast`]: firsthit_geometry::Precision::Fast
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Level {
     /// What every processor has; the compiler does with it what it can.
     Scalar,
     /// AVX2, FMA and BMI2 of x86-64.
+    #[default]
     Avx2,
 }
 
 impl Level {
     /// Every level, from the least demanding.
     pub const ALL: [Self; 2] = [Self::Scalar, Self::Avx2];
-
-    /// The best that this processor has.
-    #[must_use]
-    pub fn detect() -> Self {
-        if Self::Avx2.is_available() { Self::Avx2 } else { Self::Scalar }
-    }
 
     /// Whether this processor has it.
     #[must_use]
@@ -115,10 +110,6 @@ impl Available {
     /// The level wished for, or the best there is below it.
     pub(crate) fn up_to(level: Level) -> Self {
         Self(if level.is_available() { level } else { Level::Scalar })
-    }
-
-    pub(crate) fn level(self) -> Level {
-        self.0
     }
 }
 

@@ -8,7 +8,7 @@ use core::ops::ControlFlow;
 use glam::Vec3;
 
 pub(crate) use boxes::Boxes;
-pub(crate) use triangles::{Filter, Margin, Plain, Sheared};
+pub(crate) use triangles::{Either, Filter, Margin, Plain, Sheared};
 
 use crate::layout::wide8::{Reference, Wide8};
 use crate::simd::{Lanes, Stack};
@@ -38,7 +38,7 @@ pub(crate) fn traverse<L: Lanes, F: Filter<L>, P: Probe, const ORDERED: bool>(
     ray: &BoxRay,
     filter: &F,
     probe: &mut P,
-    mut test: impl FnMut(usize, [Vec3; 3]) -> ControlFlow<(), Option<f32>>,
+    mut test: impl FnMut(usize, [Vec3; 3], &mut P) -> ControlFlow<(), Option<f32>>,
 ) -> ControlFlow<()> {
     if tree.root == Reference::NOTHING {
         return ControlFlow::Continue(());
@@ -85,11 +85,11 @@ pub(crate) fn traverse<L: Lanes, F: Filter<L>, P: Probe, const ORDERED: bool>(
             let index = current.index();
             let block = &tree.blocks[index];
             let mut lanes = filter.candidates(block);
-            probe.block(&tree.order[index * 8..index * 8 + 8]);
+            probe.block(|| block.count());
             while lanes != 0 {
                 let lane = lanes.trailing_zeros() as usize;
                 lanes &= lanes - 1;
-                if let Some(end) = test(index * 8 + lane, block.triangle(lane))? {
+                if let Some(end) = test(index * 8 + lane, block.triangle(lane), probe)? {
                     t_max = end;
                     ends = L::splat(end);
                 }

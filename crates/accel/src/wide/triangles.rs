@@ -122,6 +122,20 @@ impl<L: Lanes> Filter<L> for Plain<L> {
     }
 }
 
+/// One or the other, as is known when compiling; what is not used costs nothing.
+#[derive(Clone, Copy)]
+pub(crate) struct Either<L, const WATERTIGHT: bool> {
+    pub(crate) plain: Plain<L>,
+    pub(crate) sheared: Sheared<L>,
+}
+
+impl<L: Lanes, const WATERTIGHT: bool> Filter<L> for Either<L, WATERTIGHT> {
+    #[inline(always)]
+    fn candidates(&self, block: &Block) -> u32 {
+        if WATERTIGHT { self.sheared.candidates(block) } else { self.plain.candidates(block) }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
