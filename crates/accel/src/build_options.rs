@@ -21,9 +21,9 @@ pub enum BuildQuality {
 #[non_exhaustive]
 pub enum Layout {
     /// Binary tree: simple and portable. It also stands in for meshes that others cannot hold: those with shapes.
-    #[default]
     Bvh2,
     /// Eight children a node and eight triangles a block, tested eight at a time.
+    #[default]
     Wide8,
 }
 

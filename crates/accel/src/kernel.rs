@@ -104,10 +104,7 @@ impl<const PADDING: bool, const WATERTIGHT: bool, const FALLBACK: bool, const PL
 
     #[inline(always)]
     fn filter<L: Lanes>(shear: &Shear<f32>, ray: &LocalRay) -> Either<L, WATERTIGHT> {
-        Either {
-            plain: Plain::new(ray.origin32, ray.direction32),
-            sheared: Sheared::new(ray.origin32, shear, 0.0),
-        }
+        Either { plain: Plain::new(ray.origin32, ray.direction32), sheared: Sheared::new(ray.origin32, shear, 0.0) }
     }
 
     #[inline(always)]

@@ -299,12 +299,10 @@ impl Model {
                 simd::run(*level, TraceWide { tree, offer, collector, probe })
             }
             // Meshes of triangles alone, nearly all, pay nothing for shapes.
-            MeshTree::Binary { tree, triangles, .. } if self.shapes.is_empty() => {
-                self.trace_binary::<SURFACES, false, K, C, P>(tree, triangles, ray, instance, precision, collector, probe)
-            }
-            MeshTree::Binary { tree, triangles, .. } => {
-                self.trace_binary::<SURFACES, true, K, C, P>(tree, triangles, ray, instance, precision, collector, probe)
-            }
+            MeshTree::Binary { tree, triangles, .. } if self.shapes.is_empty() => self
+                .trace_binary::<SURFACES, false, K, C, P>(tree, triangles, ray, instance, precision, collector, probe),
+            MeshTree::Binary { tree, triangles, .. } => self
+                .trace_binary::<SURFACES, true, K, C, P>(tree, triangles, ray, instance, precision, collector, probe),
         }
     }
 

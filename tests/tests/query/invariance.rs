@@ -1,6 +1,6 @@
 //! Answers depend on the scene alone: not on order, tree, scale by powers of two, or place.
 
-use firsthit_accel::{BuildOptions, BuildQuality, Crossings, Hit, Scene, SceneBuilder, VisitOrder};
+use firsthit_accel::{BuildOptions, BuildQuality, Crossings, Hit, Layout, Level, Scene, SceneBuilder, VisitOrder};
 use firsthit_geometry::{Precision, Ray};
 use firsthit_tests::oracle::{Aim, Mesh, Rng, grid_cube, icosphere, read_obj};
 use glam::{DAffine3, DVec3, Vec3};
@@ -90,6 +90,41 @@ fn trees_of_any_quality_answer_alike() {
 }
 
 /// S3: scaling by a power of two scales t alone, or nothing if the direction is scaled too.
+/// Neither the memory layout nor the instructions used change a bit, of any query.
+#[test]
+fn layouts_and_instructions_answer_alike() {
+    let scan = firsthit_tests::shared().and_then(|s| read_obj(&s.join("assets/spot/spot.obj")));
+    let meshes = [Some(icosphere(4)), Some(grid_cube(12)), scan];
+    for mesh in meshes.iter().flatten() {
+        let rays = aimed(mesh, 3000);
+        for precision in careful() {
+            let answers = |layout, simd| {
+                let mut builder =
+                    SceneBuilder::new(BuildOptions { layout, simd, precision, ..BuildOptions::default() });
+                let m = builder.add_mesh(vec![triangles(mesh)]);
+                builder.add_instance(m, DAffine3::IDENTITY);
+                builder.add_instance(m, DAffine3::from_scale(DVec3::splat(0.7)));
+                let scene = builder.build().expect("a good mesh");
+                let answer = |r: &Ray<f64>| {
+                    let line = r.with_interval(f64::NEG_INFINITY, f64::INFINITY);
+                    let lists: Vec<_> = [Crossings::Triangles, Crossings::Surfaces]
+                        .into_iter()
+                        .flat_map(|c| scene.all_hits(&line, c))
+                        .map(|h| bits(&Some(h)))
+                        .collect();
+                    (bits(&scene.closest_hit(r)), scene.any_hit(r), bits(&scene.closest_hit(&line)), lists)
+                };
+                rays.iter().map(answer).collect::<Vec<_>>()
+            };
+            let first = answers(Layout::Bvh2, Level::Scalar);
+            for level in Level::ALL {
+                let same = answers(Layout::Wide8, level) == first;
+                assert!(same, "{precision} {level}");
+            }
+        }
+    }
+}
+
 #[test]
 fn powers_of_two_change_no_bit() {
     let mesh = icosphere(3);

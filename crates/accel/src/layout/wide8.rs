@@ -104,13 +104,8 @@ impl Wide8 {
     /// Tells also which triangle is in each lane of each block; `u32::MAX` stands for none.
     pub(crate) fn new(topology: &Topology, triangles: &[[Vec3; 3]], boxes: &[Aabb<f32>]) -> (Self, Vec<u32>) {
         let collapse = Collapse::new(topology, boxes);
-        let mut tree = Self {
-            root: Reference::NOTHING,
-            nodes: Vec::new(),
-            blocks: Vec::new(),
-            depth: 0,
-            sah_cost: 0.0,
-        };
+        let mut tree =
+            Self { root: Reference::NOTHING, nodes: Vec::new(), blocks: Vec::new(), depth: 0, sah_cost: 0.0 };
         let mut order = Vec::new();
         if let Some(root) = topology.root {
             tree.root = tree.emit(&collapse, root, triangles, 1, &mut order);
@@ -244,9 +239,9 @@ impl<'a> Collapse<'a> {
         let mut plan = Plan { cost: [f32::INFINITY; 8], left: [0; 8] };
         // Shown as j + 1 children: at least one to each side.
         let split = |j: usize| {
-            (0..j).map(|k| (l.cost[k] + r.cost[j - 1 - k], k as u8 + 1)).fold((f32::INFINITY, 1), |a, b| {
-                if b.0 < a.0 { b } else { a }
-            })
+            (0..j)
+                .map(|k| (l.cost[k] + r.cost[j - 1 - k], k as u8 + 1))
+                .fold((f32::INFINITY, 1), |a, b| if b.0 < a.0 { b } else { a })
         };
         let area = self.boxes[node].area();
         let (below, left) = split(7);
@@ -255,8 +250,7 @@ impl<'a> Collapse<'a> {
         (plan.cost[0], plan.left[0]) = if leaf <= inner { (leaf, 0) } else { (inner, left) };
         for j in 1..8 {
             let (cost, left) = split(j);
-            (plan.cost[j], plan.left[j]) =
-                if plan.cost[j - 1] <= cost { (plan.cost[j - 1], 0) } else { (cost, left) };
+            (plan.cost[j], plan.left[j]) = if plan.cost[j - 1] <= cost { (plan.cost[j - 1], 0) } else { (cost, left) };
         }
         plan
     }
@@ -328,8 +322,7 @@ mod tests {
         let random = |k: usize| ((k as u32).wrapping_mul(0x9e37_79b9) >> 8) as f32 / (1 << 24) as f32;
         for n in (0..40).chain([1000, 5000]) {
             let point = |k: usize| Vec3::new(random(k), random(k + 77_777), random(3 * k + 1));
-            let triangles: Vec<_> =
-                (0..n).map(|k| [0, 1, 2].map(|i| point(k) + point(7 * k + i) * 0.02)).collect();
+            let triangles: Vec<_> = (0..n).map(|k| [0, 1, 2].map(|i| point(k) + point(7 * k + i) * 0.02)).collect();
             check(&triangles);
             check(&vec![[Vec3::ZERO, Vec3::X, Vec3::Y]; n]);
         }

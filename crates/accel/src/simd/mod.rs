@@ -69,7 +69,10 @@ impl core::str::FromStr for Level {
     type Err = String;
 
     fn from_str(s: &str) -> Result<Self, String> {
-        Self::ALL.into_iter().find(|l| l.name() == s).ok_or_else(|| format!("unknown SIMD level '{s}' (scalar or avx2)"))
+        Self::ALL
+            .into_iter()
+            .find(|l| l.name() == s)
+            .ok_or_else(|| format!("unknown SIMD level '{s}' (scalar or avx2)"))
     }
 }
 

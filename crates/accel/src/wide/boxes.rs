@@ -88,8 +88,7 @@ mod tests {
     }
 
     fn node(boxes: &[Aabb<f32>]) -> Node {
-        let mut node =
-            Node { planes: [[[f32::INFINITY; 8], [f32::NEG_INFINITY; 8]]; 3], children: [u32::MAX; 8] };
+        let mut node = Node { planes: [[[f32::INFINITY; 8], [f32::NEG_INFINITY; 8]]; 3], children: [u32::MAX; 8] };
         for (k, b) in boxes.iter().enumerate() {
             for axis in 0..3 {
                 node.planes[axis][0][k] = b.min[axis];
