@@ -12,7 +12,7 @@ use crate::layout::Bvh2;
 use crate::layout::wide8::Wide8;
 use crate::local::{Extent, LocalRay};
 use crate::normalise::common_scale;
-use crate::query::{Candidate, Collector};
+use crate::query::{Candidate, Collector, Dyn};
 use crate::simd::{self, Available, Lanes, Work};
 use crate::stats::Probe;
 use crate::traverse::traverse;
@@ -285,7 +285,7 @@ impl Model {
 
     /// Offers the hits of what is in the tree to the collector.
     #[inline(always)]
-    pub(crate) fn trace<const SURFACES: bool, K: Kernel, C: Collector + ?Sized, P: Probe>(
+    pub(crate) fn trace<const SURFACES: bool, K: Kernel, C: Collector, P: Probe>(
         &self,
         ray: &LocalRay,
         instance: u32,
@@ -298,24 +298,29 @@ impl Model {
                 let offer = OfferTriangle::<SURFACES, K>::new(self, ray, instance, collector);
                 simd::run(*level, TraceWide { tree, offer, collector, probe })
             }
-            // Meshes of triangles alone, nearly all, pay nothing for shapes.
-            MeshTree::Binary { tree, triangles, .. } if self.shapes.is_empty() => self
-                .trace_binary::<SURFACES, false, K, C, P>(tree, triangles, ray, instance, precision, collector, probe),
-            MeshTree::Binary { tree, triangles, .. } => self
-                .trace_binary::<SURFACES, true, K, C, P>(tree, triangles, ray, instance, precision, collector, probe),
+            // Any collector through a pointer, so that this is not compiled for each. Meshes of triangles alone pay
+            // nothing for shapes.
+            MeshTree::Binary { tree, triangles, .. } => {
+                let any = &mut Dyn(collector);
+                if self.shapes.is_empty() {
+                    self.trace_binary::<SURFACES, false, K, P>(tree, triangles, ray, instance, precision, any, probe)
+                } else {
+                    self.trace_binary::<SURFACES, true, K, P>(tree, triangles, ray, instance, precision, any, probe)
+                }
+            }
         }
     }
 
     /// A function of its own, so that its loop has the registers.
     #[inline(never)]
-    fn trace_binary<const SURFACES: bool, const SHAPES: bool, K: Kernel, C: Collector + ?Sized, P: Probe>(
+    fn trace_binary<const SURFACES: bool, const SHAPES: bool, K: Kernel, P: Probe>(
         &self,
         tree: &Bvh2<f32>,
         triangles: &[[Vec3; 3]],
         ray: &LocalRay,
         instance: u32,
         precision: Precision,
-        collector: &mut C,
+        collector: &mut Dyn<'_>,
         probe: &mut P,
     ) -> ControlFlow<()> {
         let mut offer = OfferTriangle::<SURFACES, K>::new(self, ray, instance, collector);
@@ -327,7 +332,7 @@ impl Model {
                 probe.primitive();
                 let shape = || self.places.get(self.id(place)?.geometry as usize);
                 if SHAPES && let Some(Places::Shape(index)) = shape() {
-                    if self.offer_shape::<C>(*index, ray, instance, precision, K::CLAMPED, collector)? {
+                    if self.offer_shape(*index, ray, instance, precision, K::CLAMPED, collector)? {
                         end = offer.shortened(collector);
                     }
                 } else if let Some(shorter) = offer.offer(place, &triangles[place], collector, probe)? {
@@ -344,7 +349,7 @@ impl Model {
     }
 
     /// Offers the hits of shapes without a finite box.
-    pub(crate) fn trace_unbounded<C: Collector + ?Sized>(
+    pub(crate) fn trace_unbounded<C: Collector>(
         &self,
         ray: &LocalRay,
         instance: u32,
@@ -357,7 +362,7 @@ impl Model {
     }
 
     /// Offers one shape's hits, nearest first, until one is taken or none is left; whether one was taken.
-    fn offer_shape<C: Collector + ?Sized>(
+    fn offer_shape<C: Collector>(
         &self,
         index: u32,
         ray: &LocalRay,
@@ -418,13 +423,13 @@ struct OfferTriangle<'a, const SURFACES: bool, K: Kernel> {
 
 impl<'a, const SURFACES: bool, K: Kernel> OfferTriangle<'a, SURFACES, K> {
     #[inline(always)]
-    fn new<C: Collector + ?Sized>(model: &'a Model, ray: &'a LocalRay, instance: u32, collector: &C) -> Self {
+    fn new<C: Collector>(model: &'a Model, ray: &'a LocalRay, instance: u32, collector: &C) -> Self {
         Self { model, ray, instance, setup: K::setup(ray), limit: collector.t_max() * ray.t_scale }
     }
 
     /// The new end of the boxes' interval if the hit was taken.
     #[inline(always)]
-    fn offer<C: Collector + ?Sized, P: Probe>(
+    fn offer<C: Collector, P: Probe>(
         &mut self,
         place: usize,
         triangle: &[Vec3; 3],
@@ -449,21 +454,21 @@ impl<'a, const SURFACES: bool, K: Kernel> OfferTriangle<'a, SURFACES, K> {
 
     /// The end of the boxes' interval, now that a hit was taken.
     #[inline(always)]
-    fn shortened<C: Collector + ?Sized>(&mut self, collector: &C) -> f32 {
+    fn shortened<C: Collector>(&mut self, collector: &C) -> f32 {
         self.limit = collector.t_max() * self.ray.t_scale;
         self.ray.box_t_max(collector.t_max())
     }
 }
 
 /// Traversal of the wide tree.
-struct TraceWide<'a, const SURFACES: bool, K: Kernel, C: ?Sized, P> {
+struct TraceWide<'a, const SURFACES: bool, K: Kernel, C, P> {
     tree: &'a Wide8,
     offer: OfferTriangle<'a, SURFACES, K>,
     collector: &'a mut C,
     probe: &'a mut P,
 }
 
-impl<const SURFACES: bool, K: Kernel, C: Collector + ?Sized, P: Probe> Work for TraceWide<'_, SURFACES, K, C, P> {
+impl<const SURFACES: bool, K: Kernel, C: Collector, P: Probe> Work for TraceWide<'_, SURFACES, K, C, P> {
     type Output = ControlFlow<()>;
 
     #[inline(always)]

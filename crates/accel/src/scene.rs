@@ -13,7 +13,7 @@ use crate::kernel::{Double, Exact, Fast, Kernel, Robust};
 use crate::layout::{Bvh2, Tree};
 use crate::local::LocalRay;
 use crate::model::{Model, PrimitiveId, Surface, limit};
-use crate::query::{Any, Closest, Collector};
+use crate::query::{Any, Closest, Collector, Dyn};
 use crate::stats::{Off, Probe};
 use crate::traverse::traverse;
 use crate::{BuildError, BuildOptions, Crossings, Geometry, Guards, Hit, HitId, TraversalCounts};
@@ -104,7 +104,7 @@ impl Scene {
     /// The nearest hit in the ray's closed interval; `None` also for an invalid ray.
     #[must_use]
     pub fn closest_hit(&self, ray: &Ray<f64>) -> Option<Hit> {
-        self.closest::<true, _>(ray, None, |_| true, &mut Off)
+        self.closest(ray, &mut Off)
     }
 
     /// The nearest hit that `accept` accepts, other than on the flat primitive `source` that the ray starts from.
@@ -120,14 +120,19 @@ impl Scene {
         source: Option<HitId>,
         accept: impl FnMut(&Hit) -> bool,
     ) -> Option<Hit> {
-        self.closest::<false, _>(ray, source, accept, &mut Off)
+        let order = |a: &Hit, b: &Hit| self.order(ray, a, b);
+        let (t_min, t_max) = (ray.t_min, ray.t_max);
+        let mut closest = Closest { t_min, t_max, source: self.flat(source), accept, order, best: None };
+        // It never breaks: the nearest hit is known at the end only.
+        let _ = self.collect(ray, Crossings::Triangles, &mut closest);
+        self.finished(closest.best)
     }
 
     /// Whether anything lies in the ray's closed interval: true exactly when [`Scene::closest_hit`] finds something.
     #[must_use]
     pub fn any_hit(&self, ray: &Ray<f64>) -> bool {
         let mut any = Any { t_min: ray.t_min, t_max: ray.t_max, source: None, accept: |_: &Hit| true };
-        self.inner.trace::<true, false, _, _>(ray, &mut any, &mut Off).is_break()
+        self.inner.trace::<false, _, _>(ray, &mut any, &mut Off).is_break()
     }
 
     /// As [`Scene::any_hit`] with a filter: see [`Scene::closest_hit_filtered`]. A filter that always says no is asked
@@ -135,14 +140,14 @@ impl Scene {
     #[must_use]
     pub fn any_hit_filtered(&self, ray: &Ray<f64>, source: Option<HitId>, accept: impl FnMut(&Hit) -> bool) -> bool {
         let mut any = Any { t_min: ray.t_min, t_max: ray.t_max, source: self.flat(source), accept };
-        self.inner.trace::<false, false, _, _>(ray, &mut any, &mut Off).is_break()
+        self.collect(ray, Crossings::Triangles, &mut any).is_break()
     }
 
     /// As [`Scene::closest_hit`], with what it cost.
     #[must_use]
     pub fn closest_hit_counted(&self, ray: &Ray<f64>) -> (Option<Hit>, TraversalCounts) {
         let mut counts = TraversalCounts::default();
-        let hit = self.closest::<false, _>(ray, None, |_| true, &mut counts);
+        let hit = self.closest(ray, &mut counts);
         (hit, counts)
     }
 
@@ -172,34 +177,31 @@ impl Scene {
         &self.inner.instances
     }
 
-    /// `STATIC` as in [`Inner::trace`].
-    pub(crate) fn closest<const STATIC: bool, P: Probe>(
-        &self,
-        ray: &Ray<f64>,
-        source: Option<HitId>,
-        accept: impl FnMut(&Hit) -> bool,
-        probe: &mut P,
-    ) -> Option<Hit> {
-        let order = |a: &Hit, b: &Hit| self.order(ray, a, b);
-        let (t_min, t_max) = (ray.t_min, ray.t_max);
-        let mut closest = Closest { t_min, t_max, source: self.flat(source), accept, order, best: None };
-        // It never breaks: the nearest hit is known at the end only.
-        let _ = self.inner.trace::<STATIC, false, _, _>(ray, &mut closest, probe);
-        closest.best.map(|hit| Hit { normal: self.world_normal(&hit), ..hit })
+    /// [`Scene::closest_hit`] with a probe: compiled for this collector alone, since it is what most rays ask.
+    pub(crate) fn closest<P: Probe>(&self, ray: &Ray<f64>, probe: &mut P) -> Option<Hit> {
+        let (accept, order) = (|_: &Hit| true, |a: &Hit, b: &Hit| self.order(ray, a, b));
+        let mut closest = Closest { t_min: ray.t_min, t_max: ray.t_max, source: None, accept, order, best: None };
+        let _ = self.inner.trace::<false, _, _>(ray, &mut closest, probe);
+        self.finished(closest.best)
     }
 
-    /// Offers all hits to the collector.
-    pub(crate) fn cross<C: Collector, P: Probe>(
+    /// Offers all hits to any collector: called through a pointer, so that the traversals of all tiers are not compiled
+    /// anew for every filter of every caller. Only candidates pay for it.
+    pub(crate) fn collect(
         &self,
         ray: &Ray<f64>,
         crossings: Crossings,
-        collector: &mut C,
-        probe: &mut P,
+        collector: &mut (dyn Collector + '_),
     ) -> ControlFlow<()> {
+        let mut collector = Dyn(collector);
         match crossings {
-            Crossings::Surfaces => self.inner.trace::<false, true, _, _>(ray, collector, probe),
-            Crossings::Triangles => self.inner.trace::<false, false, _, _>(ray, collector, probe),
+            Crossings::Surfaces => self.inner.trace::<true, _, _>(ray, &mut collector, &mut Off),
+            Crossings::Triangles => self.inner.trace::<false, _, _>(ray, &mut collector, &mut Off),
         }
+    }
+
+    fn finished(&self, best: Option<Hit>) -> Option<Hit> {
+        best.map(|hit| Hit { normal: self.world_normal(&hit), ..hit })
     }
 
     /// The primitive to skip: only what a straight ray cannot meet twice.
@@ -233,11 +235,8 @@ impl Scene {
 
 impl Inner {
     /// Offers hits to the collector, by the tests of the scene's tier.
-    ///
-    /// Guards taken away one by one are for measurements: their kernels are compiled for this collector only where it is
-    /// `STATIC`, and else called through a pointer, so that not every filter of every caller is compiled a dozen times.
     #[inline]
-    fn trace<const STATIC: bool, const SURFACES: bool, C: Collector, P: Probe>(
+    fn trace<const SURFACES: bool, C: Collector, P: Probe>(
         &self,
         ray: &Ray<f64>,
         collector: &mut C,
@@ -251,17 +250,14 @@ impl Inner {
             Precision::Robust if self.options.guards.contains(Guards::ALL.difference(Guards::OFFSET)) => {
                 self.trace_by::<SURFACES, Robust<true, true, true, true>, C, P>(ray, collector, probe)
             }
-            Precision::Robust if STATIC => self.trace_guarded::<SURFACES, C, P>(ray, collector, probe),
-            Precision::Robust => {
-                self.trace_guarded::<SURFACES, _, _>(ray, collector as &mut (dyn Collector + '_), probe)
-            }
+            Precision::Robust => self.trace_guarded::<SURFACES, C, P>(ray, collector, probe),
             Precision::Double => self.trace_by::<SURFACES, Double, C, P>(ray, collector, probe),
             Precision::Exact => self.trace_by::<SURFACES, Exact, C, P>(ray, collector, probe),
         }
     }
 
     /// The robust tier without some of its guards.
-    fn trace_guarded<const SURFACES: bool, C: Collector + ?Sized, P: Probe>(
+    fn trace_guarded<const SURFACES: bool, C: Collector, P: Probe>(
         &self,
         ray: &Ray<f64>,
         collector: &mut C,
@@ -287,7 +283,7 @@ impl Inner {
         }
     }
 
-    fn trace_by<const SURFACES: bool, K: Kernel, C: Collector + ?Sized, P: Probe>(
+    fn trace_by<const SURFACES: bool, K: Kernel, C: Collector, P: Probe>(
         &self,
         ray: &Ray<f64>,
         collector: &mut C,

@@ -22,9 +22,9 @@ impl Scene {
     #[must_use]
     pub fn closest_hit_in_order(&self, ray: &Ray<f64>, order: VisitOrder) -> Option<Hit> {
         match order {
-            VisitOrder::NearFirst => self.closest::<false, _>(ray, None, |_| true, &mut Off),
-            VisitOrder::FarFirst => self.closest::<false, _>(ray, None, |_| true, &mut FarFirst),
-            VisitOrder::Exhaustive => self.closest::<false, _>(ray, None, |_| true, &mut Exhaustive),
+            VisitOrder::NearFirst => self.closest(ray, &mut Off),
+            VisitOrder::FarFirst => self.closest(ray, &mut FarFirst),
+            VisitOrder::Exhaustive => self.closest(ray, &mut Exhaustive),
         }
     }
 }

@@ -6,7 +6,6 @@ use firsthit_geometry::Ray;
 use rayon::prelude::*;
 
 use super::{Candidate, Collector, Crossings, batch::CHUNK};
-use crate::stats::Off;
 use crate::{Hit, HitId, Scene};
 
 /// Keeps every accepted hit.
@@ -142,7 +141,7 @@ impl Scene {
         hits.clear();
         let mut all = All { t_min: ray.t_min, t_max: ray.t_max, source: self.flat(source), accept, hits };
         // It never breaks.
-        let _ = self.cross(ray, crossings, &mut all, &mut Off);
+        let _ = self.collect(ray, crossings, &mut all);
         let hits = all.hits;
         hits.sort_by(|a, b| self.order(ray, a, b));
         for hit in hits {

@@ -6,7 +6,6 @@ use firsthit_geometry::Ray;
 use rayon::prelude::*;
 
 use super::{Candidate, Collector, Crossings, batch::CHUNK};
-use crate::stats::Off;
 use crate::{Hit, HitId, Scene};
 
 /// Counts the accepted hits.
@@ -58,7 +57,7 @@ impl Scene {
     ) -> u32 {
         let mut count = Count { t_min: ray.t_min, t_max: ray.t_max, source: self.flat(source), accept, count: 0 };
         // It never breaks.
-        let _ = self.cross(ray, crossings, &mut count, &mut Off);
+        let _ = self.collect(ray, crossings, &mut count);
         count.count
     }
 

@@ -43,3 +43,25 @@ pub(crate) trait Collector {
         true
     }
 }
+
+/// Any collector, called through a pointer.
+pub(crate) struct Dyn<'a>(pub(crate) &'a mut (dyn Collector + 'a));
+
+impl Collector for Dyn<'_> {
+    #[inline(always)]
+    fn t_min(&self) -> f64 {
+        self.0.t_min()
+    }
+    #[inline(always)]
+    fn t_max(&self) -> f64 {
+        self.0.t_max()
+    }
+    #[inline(always)]
+    fn offer(&mut self, hit: Candidate) -> ControlFlow<(), bool> {
+        self.0.offer(hit)
+    }
+    #[inline(always)]
+    fn ordered(&self) -> bool {
+        self.0.ordered()
+    }
+}
