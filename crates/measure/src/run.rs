@@ -41,7 +41,7 @@ impl Effort {
     fn size(self) -> Size {
         match self {
             Self::Quick => Size { picture: 64, aimed: 30_000 },
-            Self::Normal => Size { picture: 128, aimed: 150_000 },
+            Self::Normal => Size { picture: 96, aimed: 150_000 },
             Self::Thorough => Size { picture: 256, aimed: 2_000_000 },
         }
     }
@@ -59,7 +59,7 @@ impl Effort {
     fn budget(self) -> Duration {
         Duration::from_secs(match self {
             Self::Quick => 2,
-            Self::Normal => 14,
+            Self::Normal => 12,
             Self::Thorough => 180,
         })
     }

@@ -9,7 +9,11 @@ struct Sum<'a> {
     ratio: f64,
     leaks: u64,
     aimed: u64,
+    slipped: u64,
+    /// Wrong hits and misses that the rounding of f32 does not excuse.
     wrong: u64,
+    /// All wrong hits and misses.
+    any_wrong: u64,
     compared: u64,
     self_hits: u64,
     bounces: u64,
@@ -25,8 +29,9 @@ impl<'a> Sum<'a> {
             ratio: (logs.iter().sum::<f64>() / logs.len() as f64).exp(),
             leaks: total(|r| r.leaks.unwrap_or(0)),
             aimed: total(|r| r.aimed_rays),
-            // Which of two triangles at an edge is hit is no error that shows.
-            wrong: total(|r| r.false_hits + r.false_misses),
+            slipped: total(|r| r.slipped),
+            wrong: total(|r| r.false_hits_by_level[0] + r.false_misses_by_level[0]),
+            any_wrong: total(|r| r.false_hits + r.false_misses),
             compared: total(|r| r.compared),
             self_hits: total(|r| r.self_hits),
             bounces: total(|r| r.bounces),
@@ -35,7 +40,7 @@ impl<'a> Sum<'a> {
     }
 
     fn is_clean(&self) -> bool {
-        self.leaks == 0 && self.wrong == 0 && self.self_hits == 0
+        self.leaks == 0 && self.slipped == 0 && self.wrong == 0 && self.self_hits == 0
     }
 
     fn faults(&self) -> String {
@@ -43,17 +48,31 @@ impl<'a> Sum<'a> {
         if self.leaks > 0 {
             faults.push(format!("{} of {} aimed rays leak", self.leaks, self.aimed));
         }
-        if self.wrong > self.leaks {
-            faults.push(format!("{} of {} rays hit or miss wrongly", self.wrong, self.compared));
+        if self.slipped > self.leaks {
+            faults.push(format!("{} of {} rays slip through a surface", self.slipped, self.compared));
+        }
+        if self.wrong > 0 {
+            faults.push(format!("{} hit or miss wrongly by more than rounding", self.wrong));
         }
         if self.self_hits > 0 {
             faults.push(format!("{} of {} bounced rays hit what they left", self.self_hits, self.bounces));
         }
         faults.join(", ")
     }
+
+    /// What its ratio means.
+    fn cost(&self) -> String {
+        match (self.ratio - 1.0) * 100.0 {
+            p if !p.is_finite() => "its cost was not measured".into(),
+            p if p.round() == 0.0 => "as fast as fast".into(),
+            p if p > 0.0 => format!("{p:.0} % more time than fast"),
+            p => format!("{:.0} % less time than fast", -p),
+        }
+    }
 }
 
-/// The verdict on a model from its rows. The tier to use is the cheapest one that made no error of hit or miss.
+/// The verdict on a model from its rows. The tier to use is the cheapest one without a leak, a ray slipped through, a
+/// self-hit, or a wrong decision that rounding does not excuse.
 #[must_use]
 pub fn verdict(rows: &[TierRow], model: &str) -> String {
     let rows: Vec<&TierRow> = rows.iter().filter(|r| r.model == model && r.guard.is_empty()).collect();
@@ -69,26 +88,26 @@ pub fn verdict(rows: &[TierRow], model: &str) -> String {
         let last = sums.last().unwrap_or(cheapest);
         return format!("No measured tier is without error: at {}, {}.", last.tier, last.faults());
     };
-    let cost = |s: &Sum<'_>| match s.ratio {
-        r if !r.is_finite() => "its cost was not measured".into(),
-        r if r >= 1.0 => format!("{:.0} % more time than fast", (r - 1.0) * 100.0),
-        r => format!("{:.0} % less time than fast", (1.0 - r) * 100.0),
-    };
     let mut text = format!("Use {}", best.tier);
     if best.tier != "fast" {
-        text += &format!(" ({})", cost(best));
+        text += &format!(" ({})", best.cost());
     }
-    text += &format!(": no wrong hit or miss in {} rays (rate below {})", best.compared, rate(0, best.compared));
+    text +=
+        &format!(": none of {} rays slips through a surface (rate below {})", best.compared, rate(0, best.compared));
     if best.aimed > 0 {
         text += &format!(", no leak in {} aimed ones", best.aimed);
     }
     text += &format!(", t within {} ulp.", short(best.t_ulp));
+    if best.any_wrong > 0 {
+        text +=
+            &format!(" At silhouettes and rims rounding decides {} of them otherwise than exactly.", best.any_wrong);
+    }
     if !cheapest.is_clean() {
         text += &format!(" With {}, {}.", cheapest.tier, cheapest.faults());
     }
     for other in sums.iter().skip_while(|s| s.tier != best.tier).skip(1) {
         let name = other.tier[..1].to_uppercase() + &other.tier[1..];
-        text += &format!(" {name}: {}.", cost(other));
+        text += &format!(" {name}: {}.", other.cost());
     }
     text
 }
@@ -138,8 +157,8 @@ mod tests {
         let text = verdict(&rows, "m");
         assert_eq!(
             text,
-            "Use robust (8 % more time than fast): no wrong hit or miss in 1000 rays (rate below 3.0e-3), no leak in 1000 \
-             aimed ones, t within 0.50 ulp. With fast, 7 of 1000 aimed rays leak. Double: 40 % more time than fast."
+            "Use robust (8 % more time than fast): none of 1000 rays slips through a surface (rate below 3.0e-3), no leak in \
+             1000 aimed ones, t within 0.50 ulp. With fast, 7 of 1000 aimed rays leak. Double: 40 % more time than fast."
         );
         let guard = TierRow { guard: "only padding".into(), ..row("robust", 1.0, 9) };
         assert_eq!(verdict(&[rows.as_slice(), &[guard]].concat(), "m"), text, "guards are no tiers");
@@ -147,8 +166,14 @@ mod tests {
 
     #[test]
     fn numbers_change_the_verdict() {
-        assert!(verdict(&[row("fast", 1.0, 0), row("robust", 0.9, 0)], "m").starts_with("Use fast: no wrong"));
+        assert!(verdict(&[row("fast", 1.0, 0), row("robust", 0.9, 0)], "m").starts_with("Use fast: none of 1000"));
         assert!(verdict(&[row("fast", 1.0, 1)], "m").starts_with("No measured tier is without error: at fast, 1 of"));
+        let through = TierRow { slipped: 3, ..row("fast", 1.0, 0) };
+        let text = verdict(&[through, row("robust", 1.0, 0)], "m");
+        assert!(text.starts_with("Use robust (as fast as fast)") && text.contains("3 of 1000 rays slip"), "{text}");
+        let silhouette = TierRow { false_misses: 5, false_misses_by_level: [0, 5, 0], ..row("fast", 1.0, 0) };
+        let text = verdict(&[silhouette], "m");
+        assert!(text.starts_with("Use fast") && text.contains("rounding decides 5"), "{text}");
         assert_eq!(verdict(&[], "m"), "Nothing was measured.");
     }
 }

@@ -65,7 +65,7 @@ fn tiers<'a>(out: &mut String, rows: impl Iterator<Item = &'a TierRow>) {
         if last.is_empty() {
             let _ = writeln!(
                 out,
-                "  {:10} {:7} {:>8} {:>7} {:>7} {:>10} {:>10} {:>10} {:>10}  t error in ulp: 50 %, 99 %, max",
+                "  {:10} {:7} {:>8} {:>7} {:>7} {:>10} {:>10} {:>10} {:>10} {:>10}  t error in ulp: 50 %, 99 %, max",
                 "rays", "tier", "ns/ray", "+-", "x fast", "leaks", "false hit", "false miss", "self-hits"
             );
         }
@@ -75,10 +75,11 @@ fn tiers<'a>(out: &mut String, rows: impl Iterator<Item = &'a TierRow>) {
         let leaks = r.leaks.map_or("-".into(), |n| failures(n, r.aimed_rays));
         let _ = writeln!(
             out,
-            "  {rays:10} {:7} {:8.1} {spread:5.1} % {:7.2} {leaks:>10} {:>10} {:>10} {:>10}  {}, {}, {}{}",
+            "  {rays:10} {:7} {:8.1} {spread:5.1} % {:7.2} {leaks:>10} {:>10} {:>10} {:>10} {:>10}  {}, {}, {}{}",
             r.tier,
             r.ns_per_ray,
             r.ratio_to_fast,
+            failures(r.slipped, r.compared),
             failures(r.false_hits, r.compared),
             failures(r.false_misses, r.compared),
             failures(r.self_hits, r.bounces),
@@ -109,7 +110,11 @@ fn guards(out: &mut String, rows: &[&TierRow]) {
     for kind in &kinds {
         let _ = write!(out, " {kind:>10}");
     }
-    let _ = writeln!(out, "  {:>10} {:>10} {:>10} {:>10}", "leaks", "false hit", "false miss", "self-hits");
+    let _ = writeln!(
+        out,
+        "  {:>10} {:>10} {:>10} {:>10} {:>10}",
+        "leaks", "slipped", "false hit", "false miss", "self-hits"
+    );
     let whole = rows.iter().any(|r| r.guard.is_empty() && r.tier == "robust");
     for name in names.into_iter().chain(whole.then_some("")) {
         let of: Vec<&&TierRow> = rows.iter().filter(|r| r.guard == name && r.tier == "robust").collect();
@@ -121,8 +126,9 @@ fn guards(out: &mut String, rows: &[&TierRow]) {
         let sum = |f: fn(&TierRow) -> u64| of.iter().map(|r| f(r)).sum::<u64>();
         let _ = writeln!(
             out,
-            "  {:>10} {:>10} {:>10} {:>10}",
+            "  {:>10} {:>10} {:>10} {:>10} {:>10}",
             failures(sum(|r| r.leaks.unwrap_or(0)), sum(|r| r.aimed_rays)),
+            failures(sum(|r| r.slipped), sum(|r| r.compared)),
             failures(sum(|r| r.false_hits), sum(|r| r.compared)),
             failures(sum(|r| r.false_misses), sum(|r| r.compared)),
             failures(sum(|r| r.self_hits), sum(|r| r.bounces))
