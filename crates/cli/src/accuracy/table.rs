@@ -66,7 +66,7 @@ fn tiers<'a>(out: &mut String, rows: impl Iterator<Item = &'a TierRow>) {
             let _ = writeln!(
                 out,
                 "  {:10} {:7} {:>8} {:>7} {:>7} {:>10} {:>10} {:>10} {:>10} {:>10}  t error in ulp: 50 %, 99 %, max",
-                "rays", "tier", "ns/ray", "+-", "x fast", "leaks", "false hit", "false miss", "self-hits"
+                "rays", "tier", "ns/ray", "+-", "x fast", "leaks", "slipped", "false hit", "false miss", "self-hits"
             );
         }
         let rays = if last == r.rays { "" } else { &r.rays };
