@@ -14,6 +14,9 @@ use crate::subject::{Placed, Subject};
 use crate::timing::quantile;
 use crate::workload::RaySet;
 
+/// How far apart, relative to their length, rays are close: beyond what roundings of f32 do at a clear hit.
+const NEARBY: f64 = 128.0 * f32::EPSILON as f64;
+
 /// Rays that one task compares.
 const CHUNK: usize = 1024;
 
@@ -114,7 +117,9 @@ impl Errors {
                     self.place(subject, ray, hit, first);
                 } else {
                     self.wrong_ids += 1;
-                    self.slipped += u64::from(hit.t > first.t && hit_all_around(exact, ray, first.t, hit.t));
+                    // Clearly behind: at an edge the neighbour's t differs by roundings.
+                    let behind = hit.t - first.t > 2.0 * NEARBY * first.t.abs();
+                    self.slipped += u64::from(behind && hit_all_around(exact, ray, first.t, hit.t));
                 }
             }
         }
@@ -212,7 +217,7 @@ fn hit_all_around(exact: &Scene, ray: &Ray<f64>, t: f64, beyond: f64) -> bool {
     let end = (t + 0.01 * t.abs()).min(0.5 * t + 0.5 * beyond);
     (0..8).all(|k| {
         let (sin, cos) = (f64::from(k) * std::f64::consts::FRAC_PI_4).sin_cos();
-        let direction = ray.direction + (side * cos + up * sin) * (128.0 * f64::from(f32::UNIT_ROUNDOFF));
+        let direction = ray.direction + (side * cos + up * sin) * NEARBY;
         exact.any_hit(&Ray { direction, t_max: end.min(ray.t_max), origin: ray.origin, t_min: ray.t_min })
     })
 }
@@ -273,7 +278,7 @@ mod tests {
         assert!(fast.leaks.unwrap() > 0 && fast.aimed_rays == 20_000);
         assert_eq!(fast.false_misses_by_level[0], 0, "rounding excuses what it loses at edges");
         assert_eq!(errors.leaked.len() as u64, fast.false_misses);
-        assert!(fast.slipped >= fast.false_misses, "inside, every leak is a slip, and others hit what is behind");
+        assert!(fast.slipped > fast.false_misses / 2, "inside, leaks are slips, but for narrow ridges: {fast:?}");
         assert!(fast.t_ulp_max > 0.5 && fast.t_ulp_p50 < 4.0 && fast.t_ulp_kappa_max < 16.0);
         for precision in &Precision::ALL[1..] {
             let row = self::errors(tier(*precision), RayKind::Aimed).0;

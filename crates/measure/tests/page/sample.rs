@@ -151,6 +151,7 @@ fn row(
         false_hits_by_level: [0, wrong / 3, 0],
         false_misses_by_level: [wrong / 2, wrong - wrong / 2, 0],
         wrong_ids: 2 * wrong,
+        slipped: wrong / 2,
         t_ulp_p50: 0.0,
         // Without a single hit to compare there is no percentile.
         t_ulp_p99: if guard == "none" && rays == "primary" { f64::NAN } else { ulps },
