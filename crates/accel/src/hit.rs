@@ -58,7 +58,8 @@ pub struct TraversalCounts {
     pub boxes: u32,
     /// Triangles and shapes tested.
     pub primitives: u32,
-    /// Hits of triangles that `f64` could not decide, or not round correctly: exact numbers were needed. Only at
+    /// Hits of triangles, and tests of shapes, that `f64` could not decide or not round correctly: exact numbers were
+    /// needed. Only at
     /// [`Precision::Exact`](firsthit_geometry::Precision::Exact).
     pub fallbacks: u32,
 }

@@ -16,7 +16,14 @@
 //!
 //! Setups that not every tier needs (of the box test, of a triangle test) are made by those who need them.
 
-use firsthit_geometry::{Aabb, Precision, Ray, Real, slab::Slabs, transform::Transform, triangle::Shear};
+use core::cmp::Ordering;
+
+use firsthit_geometry::{
+    Aabb, Precision, Ray, Real,
+    slab::Slabs,
+    transform::Transform,
+    triangle::{self, Shear},
+};
 use glam::{DVec3, Vec3};
 
 /// Unit roundoff of `f32`.
@@ -174,6 +181,24 @@ impl LocalRay {
             let size = ax.abs() + ay.abs() + bx.abs() + by.abs();
             !((bx * ay - by * ax).abs() > off * (size + 2.0 * off))
         })
+    }
+
+    /// Sign of the ray's direction along the triangle's normal, as the tier's test sees it.
+    pub(crate) fn side(&self, vertices: [DVec3; 3], precision: Precision) -> Ordering {
+        let (side, along) = match precision {
+            Precision::Fast => (0.0.partial_cmp(&-triangle::area_vector(vertices).dot(self.direction)), 1.0),
+            Precision::Robust => {
+                let shear = Shear::<f32>::new(self.direction32);
+                let side = shear.side(vertices.map(|v| v.as_vec3() - self.origin32));
+                (Some(side), self.direction[shear.axis()])
+            }
+            Precision::Double | Precision::Exact => {
+                let shear = Shear::<f64>::new(self.direction);
+                (Some(shear.side(vertices.map(|v| v - self.origin))), self.direction[shear.axis()])
+            }
+        };
+        let side = side.unwrap_or(Ordering::Equal);
+        if along < 0.0 { side.reverse() } else { side }
     }
 
     /// Raises `t` (local, counted from the true origin) to where the ray enters the primitive's own box, and lowers it

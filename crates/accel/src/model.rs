@@ -332,7 +332,12 @@ impl Model {
                 probe.primitive();
                 let shape = || self.places.get(self.id(place)?.geometry as usize);
                 if SHAPES && let Some(Places::Shape(index)) = shape() {
-                    if self.offer_shape(*index, ray, instance, precision, K::CLAMPED, collector)? {
+                    let taken = if precision == Precision::Exact {
+                        self.offer_exact_shape::<SURFACES, _, P>(*index, ray, instance, collector, probe)?
+                    } else {
+                        self.offer_shape(*index, ray, instance, precision, K::CLAMPED, collector)?
+                    };
+                    if taken {
                         end = offer.shortened(collector);
                     }
                 } else if let Some(shorter) = offer.offer(place, &triangles[place], collector, probe)? {
@@ -349,16 +354,58 @@ impl Model {
     }
 
     /// Offers the hits of shapes without a finite box.
-    pub(crate) fn trace_unbounded<C: Collector>(
+    pub(crate) fn trace_unbounded<const SURFACES: bool, C: Collector, P: Probe>(
         &self,
         ray: &LocalRay,
         instance: u32,
         precision: Precision,
         collector: &mut C,
+        probe: &mut P,
     ) -> ControlFlow<()> {
-        self.unbounded
-            .iter()
-            .try_for_each(|&i| self.offer_shape(i, ray, instance, precision, false, collector).map_continue(drop))
+        for &i in &self.unbounded {
+            if precision == Precision::Exact {
+                self.offer_exact_shape::<SURFACES, C, P>(i, ray, instance, collector, probe)?;
+            } else {
+                self.offer_shape(i, ray, instance, precision, false, collector)?;
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// [`Model::offer_shape`] by exact decisions. Where surfaces are counted, touching one is no crossing.
+    fn offer_exact_shape<const SURFACES: bool, C: Collector, P: Probe>(
+        &self,
+        index: u32,
+        ray: &LocalRay,
+        instance: u32,
+        collector: &mut C,
+        probe: &mut P,
+    ) -> ControlFlow<(), bool> {
+        let Some(entry) = self.shapes.get(index as usize) else { return ControlFlow::Continue(false) };
+        // The ray's own interval: what is left of it ends at a t that is rounded, and is compared with rounded ones.
+        let [t_min, t_max] = ray.interval;
+        let local = Ray { origin: ray.origin * self.scale, direction: ray.direction * self.scale, t_min, t_max };
+        let mut outcome = ControlFlow::Continue(false);
+        let fallback = entry.shape.visit_exact(&local, &mut |found, _| {
+            let hit = found.hit;
+            if SURFACES && !found.crosses {
+                return ControlFlow::Continue(());
+            }
+            outcome = collector.offer(Candidate {
+                normal: hit.normal.unwrap_or(DVec3::ZERO),
+                ..Candidate::new(instance, entry.geometry, 0, hit.t / ray.t_scale, hit.u as f32, hit.v as f32)
+            });
+            // The nearest that is taken is enough.
+            if matches!(outcome, ControlFlow::Continue(false)) {
+                ControlFlow::Continue(())
+            } else {
+                ControlFlow::Break(())
+            }
+        });
+        if fallback {
+            probe.fallback();
+        }
+        outcome
     }
 
     /// Offers one shape's hits, nearest first, until one is taken or none is left; whether one was taken.
@@ -503,11 +550,12 @@ fn within_triangle(ray: &LocalRay, t: f64, vertices: &[Vec3; 3]) -> Option<f64> 
     ray.within_box(t, &Aabb::new(a.min(b).min(c), a.max(b).max(c)))
 }
 
-/// Shapes are evaluated in `f64` at every tier: by the shortest formulas or by the stable ones.
+/// Shapes are evaluated in `f64` at the tiers below `Exact`: by the shortest formulas or by the stable ones.
 fn shape_hit(shape: &Shape<f64>, ray: &Ray<f64>, precision: Precision) -> Option<SurfaceHit<f64>> {
     match precision {
         Precision::Fast => shape.closest_hit_fast(ray),
-        Precision::Robust | Precision::Double | Precision::Exact => shape.closest_hit(ray),
+        Precision::Robust | Precision::Double => shape.closest_hit(ray),
+        Precision::Exact => shape.closest_hit_exact(ray),
     }
 }
 

@@ -294,7 +294,7 @@ impl Inner {
             let instance = &self.instances[i as usize];
             let model = &self.models[instance.model as usize];
             if let Some(local) = LocalRay::enter(ray, &instance.transform, model.extent()) {
-                model.trace_unbounded(&local, i, precision, collector)?;
+                model.trace_unbounded::<SURFACES, C, P>(&local, i, precision, collector, probe)?;
             }
         }
         // A distance in the world has gone through an instance and back: a few roundings more than a box's entry.

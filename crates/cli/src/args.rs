@@ -156,7 +156,7 @@ pub(crate) struct QualityArgs {
     #[arg(long, value_name = "LIST", default_value = "auto", value_parser = values::effects, allow_hyphen_values = true)]
     pub(crate) effects: EffectOverrides,
 
-    /// How carefully rays meet surfaces: fast, robust (no leaks) or double
+    /// How carefully rays meet surfaces: fast, robust (no leaks), double or exact
     #[arg(long, value_name = "TIER", default_value = "robust")]
     pub(crate) precision: Precision,
 }
@@ -293,7 +293,7 @@ pub(crate) struct InspectArgs {
     #[arg(long, value_name = "AXIS", allow_hyphen_values = true)]
     pub(crate) up: Option<UpAxis>,
 
-    /// The tier of precision that the trees are built for: fast, robust or double
+    /// The tier of precision that the trees are built for: fast, robust, double or exact
     #[arg(long, value_name = "TIER", default_value = "robust")]
     pub(crate) precision: Precision,
 

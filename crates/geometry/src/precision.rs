@@ -24,9 +24,8 @@ pub enum Precision {
 }
 
 impl Precision {
-    /// All tiers, from the cheapest to the most careful; but for `Exact`, as long as analytic shapes have no exact
-    /// form.
-    pub const ALL: [Self; 3] = [Self::Fast, Self::Robust, Self::Double];
+    /// All tiers, from the cheapest to the most careful.
+    pub const ALL: [Self; 4] = [Self::Fast, Self::Robust, Self::Double, Self::Exact];
 
     /// The name used on command lines and in reports.
     #[must_use]
@@ -53,6 +52,6 @@ impl FromStr for Precision {
         Self::ALL
             .into_iter()
             .find(|p| p.name() == s)
-            .ok_or_else(|| format!("unknown precision '{s}' (fast, robust or double)"))
+            .ok_or_else(|| format!("unknown precision '{s}' (fast, robust, double or exact)"))
     }
 }

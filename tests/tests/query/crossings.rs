@@ -49,7 +49,13 @@ fn closed_meshes_have_exact_parity() {
                     let count = |ray: &Ray<f64>| scene.count_hits(ray, Crossings::Surfaces);
                     assert_eq!(count(&within) % 2, 1, "{precision} {place:?} {within:?}");
                     assert_eq!(count(&line(within)) % 2, 0, "{precision} {place:?} {within:?}");
-                    assert_eq!(count(&outside) % 2, 0, "{precision} {place:?} {outside:?}");
+                    let hits = scene.all_hits(&outside, Crossings::Surfaces);
+                    let enter = hits.iter().filter(|h| scene.enters(&outside, h)).count();
+                    assert_eq!(2 * enter, hits.len(), "{precision} {place:?} {outside:?}");
+                    let toward = outside.direction.normalize();
+                    for h in hits.iter().filter(|h| h.normal.dot(toward).abs() > 1e-3) {
+                        assert_eq!(scene.enters(&outside, h), h.normal.dot(toward) < 0.0, "{precision} {place:?}");
+                    }
                     odd += scene.count_hits(&line(within), Crossings::Triangles) % 2;
                 }
             }

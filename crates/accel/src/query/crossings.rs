@@ -8,7 +8,8 @@ pub enum Crossings {
     /// number, in a fixed direction. A ray that only touches a surface, at a ridge or a tip, counts 0 or 2.
     ///
     /// A closed mesh is crossed an even number of times by every line, at each tier but `Fast`, which has no such rule:
-    /// there it is the same as [`Crossings::Triangles`]. Of analytic shapes every root counts, a double root once.
+    /// there it is the same as [`Crossings::Triangles`]. Of analytic shapes every
+    /// root counts, a double root once; at `Exact` touching a shape counts nothing.
     Surfaces,
     /// Each triangle that has the point, edges and vertices included.
     Triangles,

@@ -6,7 +6,7 @@ mod batch;
 mod closest_hit;
 mod count_hits;
 mod crossings;
-mod edge_decided;
+mod decision;
 
 use core::ops::ControlFlow;
 

@@ -273,6 +273,7 @@ impl ExactRay {
         let (e1, e2, a) = (difference(v[1], v[0]), difference(v[2], v[0]), difference(v[0], self.ray.origin));
         let (mut n, mut n_size) = (Twofold::from(0.0), 0.0);
         let (mut d, mut d_size) = (Twofold::from(0.0), 0.0);
+        #[allow(clippy::needless_range_loop, reason = "of three arrays, two by cyclic indices")]
         for i in 0..3 {
             let (j, k) = ((i + 1) % 3, (i + 2) % 3);
             let (p, q) = (e1[j] * e2[k], e1[k] * e2[j]);

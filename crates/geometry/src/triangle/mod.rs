@@ -50,7 +50,7 @@ pub fn intersect<R: Real>(precision: Precision, vertices: [R::Vec3; 3], ray: &Ra
             Some(TriangleHit { t: R::from_f64(hit.t), u: R::from_f64(hit.u), v: R::from_f64(hit.v) })
         }
         Precision::Exact => {
-            let ray = ExactRay::new(ray.to_f64())?;
+            let ray = ExactRay::new(ray.to_f64()).filter(|_| vertices.iter().all(|v| v.is_finite()))?;
             let hit = ray.hit(vertices.map(Vector3::to_f64))?;
             let single = size_of::<R>() == size_of::<f32>();
             let t = if single { R::from_f32(ray.t_f32(&hit)) } else { R::from_f64(hit.t) };

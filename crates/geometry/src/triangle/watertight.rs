@@ -140,6 +140,21 @@ impl<R: Real> Shear<R> {
         Some(Weights { u: (e1 * inverse).min(R::ONE), v: (e2 * inverse).min(R::ONE) })
     }
 
+    /// How the line passes through a triangle that it meets or crosses, as seen by this test: `Less` against the normal
+    /// by winding, `Greater` along it, when it goes towards growing coordinates of [`Shear::axis`] (else the other way
+    /// round); `Equal` where the triangle is seen from its side.
+    ///
+    /// Neighbours agree, so the crossings of a closed mesh are as often the one as the other.
+    #[must_use]
+    pub fn side(&self, vertices: [R::Vec3; 3]) -> Ordering {
+        let [(ax, ay), (bx, by), (cx, cy)] = vertices.map(|v| self.apply(v));
+        // Not of different signs, if the triangle is met. So their sum has the sign of any that is not 0.
+        let twice_area = difference_of_products(cx, by, cy, bx)
+            + difference_of_products(ax, cy, ay, cx)
+            + difference_of_products(bx, ay, by, ax);
+        0.0.partial_cmp(&twice_area).unwrap_or(Ordering::Equal)
+    }
+
     /// The axis that the ray follows most: 0, 1 or 2.
     #[inline]
     #[must_use]

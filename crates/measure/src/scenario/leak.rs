@@ -205,7 +205,7 @@ pub(super) fn parity(check: &mut Check<'_>) {
             let Some(ray) = aimed_ray(subject, &[origin], k, &mut rng) else { continue };
             let ray = if k % 2 == 0 { ray } else { rounded(ray) };
             let hits = body.scene.all_hits(&ray, Crossings::Surfaces);
-            let enter = hits.iter().filter(|h| h.normal.dot(ray.direction) < 0.0).count();
+            let enter = hits.iter().filter(|h| body.scene.enters(&ray, h)).count();
             let even = hits.len().is_multiple_of(2) && 2 * enter == hits.len();
             check.expect(even, || format!("{}: {enter} of {} hits enter: {ray:?}", body.name, hits.len()));
         }

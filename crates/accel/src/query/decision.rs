@@ -1,4 +1,4 @@
-//! Whether a hit was a close call.
+//! How a hit came about: whether it was a close call, and from which side.
 
 use firsthit_geometry::Ray;
 
@@ -20,5 +20,21 @@ impl Scene {
         let Some(model) = self.models().get(instance.model as usize) else { return false };
         LocalRay::enter(ray, &instance.transform, model.extent())
             .is_some_and(|local| local.near_edge(vertices, self.options().precision))
+    }
+
+    /// Whether the ray meets the surface from the side that the normal points to. `ray` is the ray that found the hit.
+    ///
+    /// Of a triangle that the ray nearly grazes, the sign of `normal.dot(direction)` may contradict the test that found
+    /// the hit, which sees rounded vertices. This is the side as that test saw it, so that of the crossings of a closed
+    /// mesh ([`Crossings::Surfaces`](crate::Crossings::Surfaces)) as many enter as leave.
+    #[must_use]
+    pub fn enters(&self, ray: &Ray<f64>, hit: &Hit) -> bool {
+        if let Some((instance, Surface::Triangle(vertices))) = self.surface(&hit.id)
+            && let Some(model) = self.models().get(instance.model as usize)
+            && let Some(local) = LocalRay::enter(ray, &instance.transform, model.extent())
+        {
+            return local.side(vertices, self.options().precision).is_lt();
+        }
+        hit.normal.dot(ray.direction) < 0.0
     }
 }
