@@ -24,6 +24,9 @@ fn places() -> [DAffine3; 7] {
     ]
 }
 
+/// Picks a point inside a mesh.
+type Inside = fn(&mut Rng) -> DVec3;
+
 /// Aimed at vertices, edges and faces: lines are even, rays from inside odd, rays from outside even.
 #[test]
 fn closed_meshes_have_exact_parity() {
@@ -32,7 +35,7 @@ fn closed_meshes_have_exact_parity() {
         let a = rng.unit() * std::f64::consts::TAU;
         DVec3::new(a.cos(), a.sin(), 0.0) + rng.in_cube() * 0.1
     };
-    let meshes: [(Mesh, fn(&mut Rng) -> DVec3); 3] =
+    let meshes: [(Mesh, Inside); 3] =
         [(icosphere(4), near_middle), (grid_cube(8), near_middle), (torus(48, 24, 0.4), in_tube)];
     let mut odd = 0;
     for (mesh, inside) in &meshes {
