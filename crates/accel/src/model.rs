@@ -3,7 +3,7 @@
 use core::ops::{ControlFlow, Range};
 use std::borrow::Cow;
 
-use firsthit_geometry::{Aabb, Precision, Primitive, Ray, Real, Shape, SurfaceHit, triangle};
+use firsthit_geometry::{Aabb, Precision, Primitive, Ray, Real, Shape, SurfaceHit, exact::Root, triangle};
 use glam::{DVec3, Vec3};
 
 use crate::build::Topology;
@@ -450,6 +450,16 @@ impl ModelShape {
     pub(crate) fn refine(&self, point: DVec3, normal: Option<DVec3>) -> (DVec3, f64) {
         let (point, error) = self.shape.refine(point * self.scale, normal);
         (point / self.scale, error / self.scale)
+    }
+
+    /// [`Primitive::exact_root`] for a line in the normalised space.
+    pub(crate) fn exact_root(&self, line: &Ray<f64>, t: f64) -> Option<Root> {
+        self.shape.exact_root(&self.unscaled(line), t)
+    }
+
+    /// A ray of the normalised space in the shape's own: scaled by a power of two.
+    pub(crate) fn unscaled(&self, ray: &Ray<f64>) -> Ray<f64> {
+        Ray { origin: ray.origin * self.scale, direction: ray.direction * self.scale, ..*ray }
     }
 
     /// Whether no straight ray that leaves it can come back.

@@ -2,7 +2,10 @@
 
 use core::cmp::Ordering;
 
-use firsthit_geometry::{Precision, Ray, exact::ExactRay};
+use firsthit_geometry::{
+    Precision, Ray,
+    exact::{ExactRay, Root},
+};
 
 use crate::model::Surface;
 use crate::{Hit, Scene};
@@ -10,8 +13,8 @@ use crate::{Hit, Scene};
 impl Scene {
     /// The order of two hits of a ray: by `t`, then by id.
     ///
-    /// At [`Precision::Exact`] `t` is rounded, and of triangles of one instance with equal `t` the exact order decides
-    /// before the id; shapes come after them.
+    /// At [`Precision::Exact`] `t` is rounded, and of hits in one instance with equal `t` the exact order decides before
+    /// the id. (Several hits of one shape with equal `t` stay together, where the first of them is.)
     pub(crate) fn order(&self, ray: &Ray<f64>, a: &Hit, b: &Hit) -> Ordering {
         a.t.total_cmp(&b.t).then_with(|| {
             let exact = self.options().precision == Precision::Exact && a.id.instance == b.id.instance;
@@ -21,20 +24,30 @@ impl Scene {
 
     #[cold]
     fn exact_order(&self, ray: &Ray<f64>, a: &Hit, b: &Hit) -> Ordering {
+        let t = a.t;
         let (Some((instance, a)), Some((_, b))) = (self.surface(&a.id), self.surface(&b.id)) else {
             return Ordering::Equal;
         };
-        match (a, b) {
+        if let (Surface::Triangle(a), Surface::Triangle(b)) = (&a, &b)
+            && a == b
+        {
             // Coincident triangles may be many.
-            (Surface::Triangle(a), Surface::Triangle(b)) if a == b => Ordering::Equal,
-            (Surface::Triangle(a), Surface::Triangle(b)) => {
-                let line = instance.transform.ray_to_object(ray).with_interval(f64::NEG_INFINITY, f64::INFINITY);
-                let hits = ExactRay::new(line).and_then(|line| Some((line.hit(a)?, line.hit(b)?, line)));
-                hits.map_or(Ordering::Equal, |(a, b, line)| line.order(&a, &b))
+            return Ordering::Equal;
+        }
+        let line = instance.transform.ray_to_object(ray).with_interval(f64::NEG_INFINITY, f64::INFINITY);
+        a.root(&line, t).zip(b.root(&line, t)).map_or(Ordering::Equal, |(a, b)| a.cmp(&b))
+    }
+}
+
+impl Surface<'_> {
+    /// The exact parameter of a line's first hit whose rounded one is `t`.
+    pub(crate) fn root(&self, line: &Ray<f64>, t: f64) -> Option<Root> {
+        match self {
+            Surface::Triangle(v) => {
+                let line = ExactRay::new(*line)?;
+                line.hit(*v).map(|hit| line.root(&hit))
             }
-            (Surface::Triangle(_), Surface::Shape(_)) => Ordering::Less,
-            (Surface::Shape(_), Surface::Triangle(_)) => Ordering::Greater,
-            (Surface::Shape(_), Surface::Shape(_)) => Ordering::Equal,
+            Surface::Shape(shape) => shape.exact_root(line, t),
         }
     }
 }

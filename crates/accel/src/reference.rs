@@ -3,9 +3,11 @@
 //! Obvious, and right wherever double precision can decide. Queries of any tier and layout are tested against it; it is
 //! public so that you can do so too.
 
+use core::ops::ControlFlow;
+
 use firsthit_geometry::{
     Primitive, Ray,
-    exact::ExactRay,
+    exact::{ExactRay, Root},
     triangle::{self, Shear},
 };
 use glam::DVec3;
@@ -65,8 +67,8 @@ pub fn crossings(scene: &Scene, ray: &Ray<f64>, what: Crossings) -> Vec<Hit> {
     hits
 }
 
-/// All hits of triangles in the ray's closed interval, decided exactly in each instance's own space, for the ray as
-/// rounded there: `t` correctly rounded, in exact order within an instance. Shapes are left out.
+/// All hits in the ray's closed interval, decided exactly in each instance's own space, for the ray as rounded there:
+/// `t` correctly rounded, in exact order within an instance.
 ///
 /// At [`Precision::Exact`](firsthit_geometry::Precision::Exact) the scene answers the same, bit for bit.
 #[must_use]
@@ -74,20 +76,41 @@ pub fn exact_crossings(scene: &Scene, ray: &Ray<f64>, what: Crossings) -> Vec<Hi
     let mut hits = Vec::new();
     for (i, instance) in scene.instances().iter().enumerate() {
         let Some(model) = scene.models().get(instance.model as usize) else { continue };
-        let Some(local) = ExactRay::new(instance.transform.ray_to_object(ray)) else { continue };
+        let transform = &instance.transform;
+        let local = transform.ray_to_object(ray);
+        let Some(exact) = ExactRay::new(local) else { continue };
+        let counts = |crosses: bool| crosses || what == Crossings::Triangles;
         for (id, surface) in model.surfaces() {
-            let Surface::Triangle(v) = surface else { continue };
-            if let Some(h) = local.hit(v).filter(|h| h.crosses || what == Crossings::Triangles) {
-                let id = HitId { instance: i as u32, geometry: id.geometry, primitive: id.primitive };
-                let normal = triangle::normal(v).map_or(DVec3::ZERO, |n| instance.transform.normal(n));
-                hits.push((h, Hit { id, t: h.t, u: h.u as f32, v: h.v as f32, normal }));
+            let id = HitId { instance: i as u32, geometry: id.geometry, primitive: id.primitive };
+            match surface {
+                Surface::Triangle(v) => {
+                    if let Some(h) = exact.hit(v).filter(|h| counts(h.crosses)) {
+                        let normal = triangle::normal(v).map_or(DVec3::ZERO, |n| transform.normal(n));
+                        let hit = Hit { id, t: h.t, u: h.u as f32, v: h.v as f32, normal };
+                        hits.push((exact.root(&h), hit));
+                    }
+                }
+                Surface::Shape(s) => {
+                    // The first of the hits that are rounded to one `t` stands for them.
+                    let mut first: Option<(f64, Root)> = None;
+                    s.shape.visit_exact(&s.unscaled(&local), &mut |found, root| {
+                        let h = found.hit;
+                        let (_, root) = first.take().filter(|(t, _)| *t == h.t).unwrap_or_else(|| (h.t, root()));
+                        first = Some((h.t, root.clone()));
+                        if counts(found.crosses) {
+                            let normal = h.normal.map_or(DVec3::ZERO, |n| transform.normal(n));
+                            hits.push((root, Hit { id, t: h.t, u: h.u as f32, v: h.v as f32, normal }));
+                        }
+                        ControlFlow::Continue(())
+                    });
+                }
             }
         }
-        // Sorting is stable: across instances the rounded t decides, then the instance.
         let of_instance = |(_, hit): &(_, Hit)| hit.id.instance == i as u32;
         let start = hits.partition_point(|h| !of_instance(h));
-        hits[start..].sort_by(|(x, a), (y, b)| local.order(x, y).then(a.id.cmp(&b.id)));
+        hits[start..].sort_by(|(x, a), (y, b)| a.t.total_cmp(&b.t).then_with(|| x.cmp(y)).then(a.id.cmp(&b.id)));
     }
+    // Sorting is stable: across instances the rounded t decides, then the instance.
     hits.sort_by(|(_, a), (_, b)| a.t.total_cmp(&b.t));
     hits.into_iter().map(|(_, hit)| hit).collect()
 }

@@ -1,7 +1,8 @@
 //! The exact tier against exact brute force, and the others against the exact tier.
 
-use firsthit_accel::{Crossings, Hit, Scene, SceneBuilder, reference};
-use firsthit_geometry::{Precision, Ray};
+use firsthit_accel::{Crossings, Geometry, Hit, Scene, SceneBuilder, reference};
+use firsthit_geometry::shapes::{Cuboid, Disk, Plane, Polygon, Quadric, Solid, Sphere};
+use firsthit_geometry::{Precision, Ray, Shape};
 use firsthit_tests::oracle::{Aim, Mesh, Rng, grid_cube, icosphere, torus};
 use glam::{DAffine3, DQuat, DVec3, Vec3};
 
@@ -89,6 +90,58 @@ fn instances_answer_as_exact_brute_force() {
         let target = Aim::ALL[k % 3].point(mesh.corners(rng.below(60)), &mut rng);
         let origin = rng.in_cube() * 4.0;
         same_as_brute_force(&scene, &Ray::new(origin, target - origin));
+    }
+}
+
+/// Shapes and triangles together, touching each other along lattice points: what is nearest, in which order, what counts
+/// as a crossing.
+#[test]
+fn shapes_answer_as_exact_brute_force() {
+    let mut rng = Rng(94);
+    let can = Quadric::cylinder(1.0, -1.0, 1.0).expect("a cylinder");
+    let shapes: Vec<Shape<f64>> = vec![
+        Sphere::new(DVec3::ZERO, 1.0).expect("a sphere").into(),
+        Sphere::new(DVec3::X, 1.0).expect("a sphere").into(),
+        Cuboid::new(DVec3::splat(-1.0), DVec3::ONE).expect("a box").into(),
+        Disk::new(DVec3::Y, DVec3::Y, 1.0, 0.5).expect("a disk").into(),
+        Plane::new(DVec3::NEG_Y, DVec3::new(0.0, 1.0, 0.0)).expect("a plane").into(),
+        Polygon::new(vec![vec![DVec3::NEG_X, DVec3::X, DVec3::new(0.0, 2.0, 1.0)]]).expect("a triangle").into(),
+        can.into(),
+        Solid::new(can).into(),
+        Solid::new(Quadric::cone(1.0, -1.0, 1.0).expect("a cone")).into(),
+    ];
+    let turned = DQuat::from_axis_angle(DVec3::new(1.0, 2.0, -0.5).normalize(), 0.9);
+    let places = [
+        DAffine3::IDENTITY,
+        DAffine3::from_translation(DVec3::new(1e7, 1e7, -1e7)),
+        DAffine3::from_scale_rotation_translation(DVec3::new(-1.0, 2e-3, 0.5), turned, DVec3::splat(7.0)),
+    ];
+    for place in places {
+        let mut builder = SceneBuilder::new(options(Precision::Exact));
+        let together = shapes.iter().cloned().map(Geometry::Shape).chain([triangles(&grid_cube(2))]).collect();
+        let all = builder.add_mesh(together);
+        builder.add_instance(all, place);
+        for shape in &shapes {
+            let alone = builder.add_mesh(vec![Geometry::Shape(shape.clone())]);
+            builder.add_instance(alone, place);
+        }
+        let scene = builder.build().expect("a good scene");
+        for k in 0..800 {
+            let lattice = |p: DVec3| (p * 4.0).round() / 2.0;
+            let origin = match k % 4 {
+                0 => rng.in_cube() * 3.0,
+                1 => lattice(rng.in_cube() * 2.0),
+                2 => lattice(rng.in_cube()) * 1024.0,
+                _ => rng.in_cube() * 1e9,
+            };
+            let target = if k % 3 == 0 { rng.in_cube() } else { lattice(rng.in_cube() * 0.75) };
+            let (origin, target) = (place.transform_point3(origin), place.transform_point3(target));
+            let ray = Ray::new(origin, target - origin);
+            if ray.is_valid() {
+                same_as_brute_force(&scene, &ray);
+                same_as_brute_force(&scene, &ray.with_interval(f64::NEG_INFINITY, 1.0));
+            }
+        }
     }
 }
 
