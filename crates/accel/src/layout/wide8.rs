@@ -65,7 +65,12 @@ impl Block {
     #[inline(always)]
     pub(crate) fn triangle(&self, lane: usize) -> [Vec3; 3] {
         let lane = lane & 7;
-        self.0.map(|v| Vec3::new(v[0][lane], v[1][lane], v[2][lane]))
+        let [a, b, c] = &self.0;
+        [
+            Vec3::new(a[0][lane], a[1][lane], a[2][lane]),
+            Vec3::new(b[0][lane], b[1][lane], b[2][lane]),
+            Vec3::new(c[0][lane], c[1][lane], c[2][lane]),
+        ]
     }
 }
 

@@ -23,40 +23,58 @@ pub(crate) struct Boxes<L> {
     pad: L,
 }
 
+/// One axis of a ray.
+struct Axis {
+    inverse: f32,
+    near: f32,
+    far: f32,
+}
+
+impl Axis {
+    #[inline(always)]
+    fn new(origin: f32, direction: f32, delta: f32) -> Self {
+        let direction = if direction.abs() < SMALLEST { SMALLEST.copysign(direction) } else { direction };
+        let inverse = 1.0 / direction;
+        let out = delta.copysign(direction);
+        Self { inverse, near: (origin + out) * inverse, far: (origin - out) * inverse }
+    }
+}
+
 impl<L: Lanes> Boxes<L> {
     /// For boxes that are to be met as if larger by `delta` in each axis, and by the roundings of the test.
     #[inline(always)]
     pub(crate) fn new(origin: Vec3, direction: Vec3, delta: Vec3, padded: bool) -> Self {
-        let d = direction.to_array().map(|d| if d.abs() < SMALLEST { SMALLEST.copysign(d) } else { d });
-        let inverse = d.map(|d| 1.0 / d);
-        let negative = d.map(f32::is_sign_negative);
-        let axis = |k: usize, side: f32| {
-            let out = if negative[k] { -delta[k] } else { delta[k] };
-            (origin[k] + side * out) * inverse[k]
-        };
+        let [x, y, z] = [
+            Axis::new(origin.x, direction.x, delta.x),
+            Axis::new(origin.y, direction.y, delta.y),
+            Axis::new(origin.z, direction.z, delta.z),
+        ];
         Self {
-            inverse: inverse.map(L::splat),
-            near: [axis(0, 1.0), axis(1, 1.0), axis(2, 1.0)].map(L::splat),
-            far: [axis(0, -1.0), axis(1, -1.0), axis(2, -1.0)].map(L::splat),
-            negative,
+            inverse: [L::splat(x.inverse), L::splat(y.inverse), L::splat(z.inverse)],
+            near: [L::splat(x.near), L::splat(y.near), L::splat(z.near)],
+            far: [L::splat(x.far), L::splat(y.far), L::splat(z.far)],
+            negative: [x.inverse < 0.0, y.inverse < 0.0, z.inverse < 0.0],
             // 4 roundings of an end (two here, two to spare), twice: on either side.
             pad: L::splat(if padded { 8.0 * f32::EPSILON / 2.0 } else { 0.0 }),
         }
     }
 
+    /// Where the ray passes the nearer planes of one axis, and the farther ones.
+    #[inline(always)]
+    fn ends(&self, node: &Node, k: usize) -> (L, L) {
+        let [lower, upper] = &node.planes[k];
+        let (near, far) = if self.negative[k] { (upper, lower) } else { (lower, upper) };
+        (L::load(near).mul_sub(self.inverse[k], self.near[k]), L::load(far).mul_sub(self.inverse[k], self.far[k]))
+    }
+
     /// Which children the ray meets within `[t_min, t_max]`, and where it enters them.
     #[inline(always)]
     pub(crate) fn test(&self, node: &Node, t_min: L, t_max: L) -> (u32, L) {
-        let near = |k: usize| {
-            let planes = &node.planes[k][usize::from(self.negative[k])];
-            L::load(planes).mul_sub(self.inverse[k], self.near[k])
-        };
-        let far = |k: usize| {
-            let planes = &node.planes[k][usize::from(!self.negative[k])];
-            L::load(planes).mul_sub(self.inverse[k], self.far[k])
-        };
-        let enter = near(0).max(near(1)).max(near(2).max(t_min));
-        let leave = far(0).min(far(1)).min(far(2));
+        let (near0, far0) = self.ends(node, 0);
+        let (near1, far1) = self.ends(node, 1);
+        let (near2, far2) = self.ends(node, 2);
+        let enter = near0.max(near1).max(near2.max(t_min));
+        let leave = far0.min(far1).min(far2);
         // Of a missing child the far end is -infinity, and padded NaN: as the second operand it stays, and is no hit.
         let leave = t_max.min(leave.add(leave.abs().mul(self.pad)));
         (enter.le(leave), enter)

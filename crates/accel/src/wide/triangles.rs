@@ -1,6 +1,8 @@
 //! Eight triangles at once: which of them the tier's own test must look at.
 //!
 //! A filter may let too many pass, never too few: the decision is the scalar kernel's, and so are its bits.
+//!
+//! No closures and no `map` here: what is not inlined into the function compiled for the level is slow.
 
 use firsthit_geometry::triangle::Shear;
 use glam::Vec3;
@@ -8,8 +10,8 @@ use glam::Vec3;
 use crate::layout::wide8::Block;
 use crate::simd::Lanes;
 
-/// Three vertices, coordinates by axis.
-type Corners<L> = [[L; 3]; 3];
+/// Eight vectors.
+type Vectors<L> = [L; 3];
 
 /// A filter of blocks for one ray.
 pub(crate) trait Filter<L: Lanes>: Copy {
@@ -21,6 +23,7 @@ pub(crate) trait Filter<L: Lanes>: Copy {
 /// functions that are 0, which pass.
 #[derive(Clone, Copy)]
 pub(crate) struct Sheared<L> {
+    /// In the order of `axes`.
     origin: [L; 3],
     /// The axes of the sheared plane and the one that the ray follows most.
     axes: [usize; 3],
@@ -34,9 +37,10 @@ impl<L: Lanes> Sheared<L> {
     pub(crate) fn new(origin: Vec3, shear: &Shear<f32>, off: f32) -> Self {
         let axis = shear.axis();
         let (x, y) = shear.slopes();
+        let axes = [(axis + 1) % 3, (axis + 2) % 3, axis % 3];
         Self {
-            origin: origin.to_array().map(L::splat),
-            axes: [(axis + 1) % 3, (axis + 2) % 3, axis],
+            origin: [L::splat(origin[axes[0]]), L::splat(origin[axes[1]]), L::splat(origin[axes[2]])],
+            axes,
             shear: [L::splat(x), L::splat(y)],
             off: L::splat(off),
         }
@@ -44,20 +48,29 @@ impl<L: Lanes> Sheared<L> {
 
     #[inline(always)]
     fn corner(&self, block: &Block, vertex: usize) -> [L; 2] {
-        let at = |k: usize| {
-            let axis = self.axes[k] % 3;
-            L::load(&block.0[vertex][axis]).sub(self.origin[axis])
-        };
-        let z = at(2);
-        [at(0).sub(self.shear[0].mul(z)), at(1).sub(self.shear[1].mul(z))]
+        let v = &block.0[vertex];
+        let x = L::load(&v[self.axes[0]]).sub(self.origin[0]);
+        let y = L::load(&v[self.axes[1]]).sub(self.origin[1]);
+        let z = L::load(&v[self.axes[2]]).sub(self.origin[2]);
+        [x.sub(self.shear[0].mul(z)), y.sub(self.shear[1].mul(z))]
     }
 
     #[inline(always)]
     fn edges(&self, block: &Block) -> ([L; 3], [[L; 2]; 3]) {
         let [a, b, c] = [self.corner(block, 0), self.corner(block, 1), self.corner(block, 2)];
-        let edge = |p: [L; 2], q: [L; 2]| p[0].mul(q[1]).sub(p[1].mul(q[0]));
         ([edge(c, b), edge(a, c), edge(b, a)], [a, b, c])
     }
+}
+
+#[inline(always)]
+fn edge<L: Lanes>(p: [L; 2], q: [L; 2]) -> L {
+    p[0].mul(q[1]).sub(p[1].mul(q[0]))
+}
+
+/// The larger coordinate.
+#[inline(always)]
+fn size<L: Lanes>(p: [L; 2]) -> L {
+    p[0].abs().max(p[1].abs())
 }
 
 impl<L: Lanes> Filter<L> for Sheared<L> {
@@ -77,7 +90,6 @@ impl<L: Lanes> Filter<L> for Margin<L> {
     #[inline(always)]
     fn candidates(&self, block: &Block) -> u32 {
         let ([e0, e1, e2], corners) = self.0.edges(block);
-        let size = |p: [L; 2]| p[0].abs().max(p[1].abs());
         let m = size(corners[0]).max(size(corners[1])).max(size(corners[2]));
         // Coordinates up to m (plus x), each off by x: a product is off by 2mx + x^2, and rounded; two of them.
         let x = self.0.off;
@@ -90,36 +102,51 @@ impl<L: Lanes> Filter<L> for Margin<L> {
 /// The operations of Moeller and Trumbore's test, as `triangle::moeller_trumbore` does them: the same decision.
 #[derive(Clone, Copy)]
 pub(crate) struct Plain<L> {
-    origin: [L; 3],
-    direction: [L; 3],
+    origin: Vectors<L>,
+    direction: Vectors<L>,
 }
 
 impl<L: Lanes> Plain<L> {
     #[inline(always)]
     pub(crate) fn new(origin: Vec3, direction: Vec3) -> Self {
-        Self { origin: origin.to_array().map(L::splat), direction: direction.to_array().map(L::splat) }
+        Self { origin: splat(origin), direction: splat(direction) }
     }
 }
 
 impl<L: Lanes> Filter<L> for Plain<L> {
     #[inline(always)]
     fn candidates(&self, block: &Block) -> u32 {
-        let corners: Corners<L> = [0, 1, 2].map(|v| [0, 1, 2].map(|k| L::load(&block.0[v][k])));
-        let minus = |a: [L; 3], b: [L; 3]| [a[0].sub(b[0]), a[1].sub(b[1]), a[2].sub(b[2])];
-        let cross = |a: [L; 3], b: [L; 3]| {
-            let part = |i: usize, j: usize| a[i].mul(b[j]).sub(b[i].mul(a[j]));
-            [part(1, 2), part(2, 0), part(0, 1)]
-        };
-        let dot = |a: [L; 3], b: [L; 3]| a[0].mul(b[0]).add(a[1].mul(b[1])).add(a[2].mul(b[2]));
-        let (e1, e2) = (minus(corners[1], corners[0]), minus(corners[2], corners[0]));
+        let [v0, v1, v2] = [load(&block.0[0]), load(&block.0[1]), load(&block.0[2])];
+        let (e1, e2) = (minus(v1, v0), minus(v2, v0));
         let p = cross(self.direction, e2);
         let inverse = L::splat(1.0).div(dot(e1, p));
-        let s = minus(self.origin, corners[0]);
+        let s = minus(self.origin, v0);
         let u = dot(s, p).mul(inverse);
         let v = dot(self.direction, cross(s, e1)).mul(inverse);
         let (zero, one) = (L::splat(0.0), L::splat(1.0));
         zero.le(u) & zero.le(v) & u.add(v).le(one)
     }
+}
+
+#[inline(always)]
+fn splat<L: Lanes>(v: Vec3) -> Vectors<L> {
+    [L::splat(v.x), L::splat(v.y), L::splat(v.z)]
+}
+#[inline(always)]
+fn load<L: Lanes>(v: &[[f32; 8]; 3]) -> Vectors<L> {
+    [L::load(&v[0]), L::load(&v[1]), L::load(&v[2])]
+}
+#[inline(always)]
+fn minus<L: Lanes>(a: Vectors<L>, b: Vectors<L>) -> Vectors<L> {
+    [a[0].sub(b[0]), a[1].sub(b[1]), a[2].sub(b[2])]
+}
+#[inline(always)]
+fn cross<L: Lanes>(a: Vectors<L>, b: Vectors<L>) -> Vectors<L> {
+    [a[1].mul(b[2]).sub(b[1].mul(a[2])), a[2].mul(b[0]).sub(b[2].mul(a[0])), a[0].mul(b[1]).sub(b[0].mul(a[1]))]
+}
+#[inline(always)]
+fn dot<L: Lanes>(a: Vectors<L>, b: Vectors<L>) -> L {
+    a[0].mul(b[0]).add(a[1].mul(b[1])).add(a[2].mul(b[2]))
 }
 
 /// One or the other, as is known when compiling; what is not used costs nothing.
