@@ -104,7 +104,10 @@ impl<const PADDING: bool, const WATERTIGHT: bool, const FALLBACK: bool, const PL
 
     #[inline(always)]
     fn filter<L: Lanes>(shear: &Shear<f32>, ray: &LocalRay) -> Either<L, WATERTIGHT> {
-        Either { plain: Plain::new(ray.origin32, ray.direction32), sheared: Sheared::new(ray.origin32, shear, 0.0) }
+        Either {
+            plain: Plain::new(ray.origin32, ray.direction32),
+            sheared: Sheared::new(ray.origin32, ray.direction32, shear, 0.0, slack(ray)),
+        }
     }
 
     #[inline(always)]
@@ -137,8 +140,7 @@ impl<const PADDING: bool, const WATERTIGHT: bool, const FALLBACK: bool, const PL
     }
 }
 
-/// Apart from the loop, since few triangles come so far.
-#[inline(never)]
+#[inline(always)]
 fn plane(vertices: &[Vec3; 3], ray: &LocalRay) -> Option<f64> {
     triangle::plane_parameter(double(vertices), ray.origin, ray.direction)
 }
@@ -159,7 +161,14 @@ fn crossing(vertices: &[Vec3; 3], ray: &LocalRay, u: f64, v: f64) -> f64 {
 fn margin<L: Lanes>(ray: &LocalRay) -> Margin<L> {
     // A sheared coordinate takes in the errors of two axes; the rest is for the rounding of this line.
     let off = (ray.reach().max_element() * 2.1) as f32;
-    Margin(Sheared::new(ray.origin32, &Shear::new(ray.direction32), off))
+    Margin(Sheared::new(ray.origin32, ray.direction32, &Shear::new(ray.direction32), off, slack(ray)))
+}
+
+/// How far outside its own depths a triangle may be hit: it is kept within its box, which is met as if larger, and seen
+/// with rounded vertices.
+#[inline(always)]
+fn slack(ray: &LocalRay) -> f32 {
+    2.0 * ray.delta().max_element()
 }
 
 /// Tier `Double`: the same in `f64`, with the unrounded ray.

@@ -204,6 +204,7 @@ impl LocalRay {
     /// Raises `t` (local, counted from the true origin) to where the ray enters the primitive's own box, and lowers it
     /// to where it leaves: the rule by which a hit never lies before a box that holds it, so that skipping boxes cannot
     /// change the answer. The box is widened by [`LocalRay::reach`]; `None` when the ray misses even that.
+    #[inline(always)]
     pub(crate) fn within_box(&self, t: f64, aabb: &Aabb<f64>) -> Option<f64> {
         let reach = self.reach();
         let wide = Aabb::new(aabb.min - reach, aabb.max + reach);

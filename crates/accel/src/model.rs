@@ -16,7 +16,7 @@ use crate::query::{Candidate, Collector, Dyn};
 use crate::simd::{self, Available, Lanes, Work};
 use crate::stats::Probe;
 use crate::traverse::traverse;
-use crate::wide::{self, BoxRay};
+use crate::wide::{self, BoxRay, Visit};
 use crate::{BuildError, BuildOptions, Geometry, Layout};
 
 /// The parts of one mesh, ready to be traced.
@@ -530,7 +530,7 @@ impl<const SURFACES: bool, K: Kernel, C: Collector, P: Probe> Work for TraceWide
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> ControlFlow<()> {
-        let Self { tree, mut offer, collector, probe } = self;
+        let Self { tree, offer, collector, probe } = self;
         let ray = offer.ray;
         let filter = K::filter::<L>(&offer.setup, ray);
         let boxes = BoxRay {
@@ -541,20 +541,31 @@ impl<const SURFACES: bool, K: Kernel, C: Collector, P: Probe> Work for TraceWide
             t_min: ray.box_t_min(collector.t_min()),
             t_max: ray.box_t_max(collector.t_max()),
         };
-        if collector.ordered() {
-            wide::traverse::<L, _, P, true>(tree, &boxes, &filter, probe, |place, triangle, probe| {
-                offer.offer(place, &triangle, collector, probe)
-            })
+        let ordered = collector.ordered();
+        let mut visitor = OfferTo { offer, collector };
+        if ordered {
+            wide::traverse::<L, _, P, true>(tree, &boxes, &filter, probe, &mut visitor)
         } else {
-            wide::traverse::<L, _, P, false>(tree, &boxes, &filter, probe, |place, triangle, probe| {
-                offer.offer(place, &triangle, collector, probe)
-            })
+            wide::traverse::<L, _, P, false>(tree, &boxes, &filter, probe, &mut visitor)
         }
     }
 }
 
-/// [`LocalRay::within_box`] for a triangle. Apart from the loop, since few triangles come so far.
-#[inline(never)]
+/// Offers the triangles of the wide tree.
+struct OfferTo<'a, const SURFACES: bool, K: Kernel, C> {
+    offer: OfferTriangle<'a, SURFACES, K>,
+    collector: &'a mut C,
+}
+
+impl<const SURFACES: bool, K: Kernel, C: Collector, P: Probe> Visit<P> for OfferTo<'_, SURFACES, K, C> {
+    #[inline(always)]
+    fn visit(&mut self, place: usize, triangle: &[Vec3; 3], probe: &mut P) -> ControlFlow<(), Option<f32>> {
+        self.offer.offer(place, triangle, self.collector, probe)
+    }
+}
+
+/// [`LocalRay::within_box`] for a triangle.
+#[inline(always)]
 fn within_triangle(ray: &LocalRay, t: f64, vertices: &[Vec3; 3]) -> Option<f64> {
     let [a, b, c] = double(vertices);
     ray.within_box(t, &Aabb::new(a.min(b).min(c), a.max(b).max(c)))

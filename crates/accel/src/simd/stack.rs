@@ -3,6 +3,7 @@
 use core::mem::MaybeUninit;
 
 use crate::build::MAX_DEPTH;
+use crate::stats::Probe;
 
 /// Each level of a tree leaves at most seven children behind, and eight are written at once.
 const SIZE: usize = 7 * MAX_DEPTH as usize + 8;
@@ -33,6 +34,68 @@ impl Stack {
         self.len += n;
     }
 
+    /// Sorts the first `n` (2 to 8) of these keys, puts all but the smallest on top, smaller ones above, and returns the
+    /// smallest. Few keys, nearly always, are sorted without a detour through memory.
+    ///
+    /// # Panics
+    /// As [`Stack::push`].
+    #[inline(always)]
+    pub(crate) fn push_all_but_nearest<P: Probe>(&mut self, mut keys: [u64; 8], n: usize) -> u64 {
+        if P::REVERSED {
+            keys[..n.min(8)].iter_mut().for_each(|k| *k = !*k);
+        }
+        let [a, b, c, d, ..] = keys;
+        let nearest = match n {
+            2 => {
+                let (a, b) = order(a, b);
+                self.put::<P, 1>([b]);
+                a
+            }
+            3 => {
+                let (a, b) = order(a, b);
+                let (b, c) = order(b, c);
+                let (a, b) = order(a, b);
+                self.put::<P, 2>([c, b]);
+                a
+            }
+            4 => {
+                let ((a, b), (c, d)) = (order(a, b), order(c, d));
+                let ((a, c), (b, d)) = (order(a, c), order(b, d));
+                let (b, c) = order(b, c);
+                self.put::<P, 3>([d, c, b]);
+                a
+            }
+            _ => self.push_many::<P>(keys, n),
+        };
+        if P::REVERSED { !nearest } else { nearest }
+    }
+
+    #[inline(never)]
+    fn push_many<P: Probe>(&mut self, mut keys: [u64; 8], n: usize) -> u64 {
+        let keys = &mut keys[..n.min(8)];
+        for i in 1..keys.len() {
+            let key = keys[i];
+            let mut k = i;
+            while k > 0 && keys[k - 1] < key {
+                keys[k] = keys[k - 1];
+                k -= 1;
+            }
+            keys[k] = key;
+        }
+        let Some((nearest, rest)) = keys.split_last() else { return 0 };
+        rest.iter().for_each(|k| self.put::<P, 1>([*k]));
+        *nearest
+    }
+
+    #[inline(always)]
+    fn put<P: Probe, const N: usize>(&mut self, keys: [u64; N]) {
+        assert!(self.len + N <= SIZE, "trees are not so deep");
+        for (slot, key) in self.entries[self.len..self.len + N].iter_mut().zip(keys) {
+            slot.write(if P::REVERSED { !key } else { key });
+        }
+        self.len += N;
+    }
+
     #[inline(always)]
     pub(crate) fn pop(&mut self) -> Option<u64> {
         self.len = self.len.checked_sub(1)?;
@@ -41,9 +104,33 @@ impl Stack {
     }
 }
 
+/// The smaller first.
+#[inline(always)]
+fn order(a: u64, b: u64) -> (u64, u64) {
+    (a.min(b), a.max(b))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stats::{FarFirst, Off};
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn the_nearest_comes_first_then_the_others(keys in prop::array::uniform8(any::<u64>()), n in 2usize..=8) {
+            let mut sorted = keys[..n].to_vec();
+            sorted.sort_unstable();
+            let mut stack = Stack::new();
+            let mut got = vec![stack.push_all_but_nearest::<Off>(keys, n)];
+            got.extend(core::iter::from_fn(|| stack.pop()));
+            prop_assert_eq!(&got, &sorted);
+            got = vec![stack.push_all_but_nearest::<FarFirst>(keys, n)];
+            got.extend(core::iter::from_fn(|| stack.pop()));
+            sorted.reverse();
+            prop_assert_eq!(&got, &sorted);
+        }
+    }
 
     #[test]
     fn last_in_first_out_up_to_the_deepest_tree() {

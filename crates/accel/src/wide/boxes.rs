@@ -15,70 +15,75 @@ const SMALLEST: f32 = 1e-18;
 /// whoever widens the origins must cover), and two more roundings are relative to the result.
 #[derive(Clone, Copy)]
 pub(crate) struct Boxes<L> {
-    inverse: [L; 3],
-    /// Origins times the reciprocals: for the planes where the ray enters, and where it leaves.
-    near: [L; 3],
-    far: [L; 3],
-    negative: [bool; 3],
-    pad: L,
+    near: [Ends<L>; 3],
+    far: [Ends<L>; 3],
+    /// Added to the far ends, relative to them, for lines that begin before 0; others have it in `far`.
+    line: Option<L>,
 }
 
-/// One axis of a ray.
-struct Axis {
-    inverse: f32,
-    near: f32,
-    far: f32,
+/// Planes of one axis and one side.
+#[derive(Clone, Copy)]
+struct Ends<L> {
+    /// Lower (0) or upper (1).
+    side: usize,
+    inverse: L,
+    /// The origin times the reciprocal.
+    origin: L,
 }
 
-impl Axis {
+impl<L: Lanes> Ends<L> {
     #[inline(always)]
-    fn new(origin: f32, direction: f32, delta: f32) -> Self {
-        let direction = if direction.abs() < SMALLEST { SMALLEST.copysign(direction) } else { direction };
-        let inverse = 1.0 / direction;
-        let out = delta.copysign(direction);
-        Self { inverse, near: (origin + out) * inverse, far: (origin - out) * inverse }
+    fn new(side: usize, inverse: f32, origin: f32) -> Self {
+        Self { side, inverse: L::splat(inverse), origin: L::splat(origin * inverse) }
+    }
+
+    #[inline(always)]
+    fn at(&self, planes: &[[f32; 8]; 2]) -> L {
+        L::load(&planes[self.side & 1]).mul_sub(self.inverse, self.origin)
     }
 }
+
+/// 4 roundings of an end (two here, two to spare), twice: on either side.
+const PAD: f32 = 8.0 * f32::EPSILON / 2.0;
 
 impl<L: Lanes> Boxes<L> {
     /// For boxes that are to be met as if larger by `delta` in each axis, and by the roundings of the test.
     #[inline(always)]
-    pub(crate) fn new(origin: Vec3, direction: Vec3, delta: Vec3, padded: bool) -> Self {
-        let [x, y, z] = [
-            Axis::new(origin.x, direction.x, delta.x),
-            Axis::new(origin.y, direction.y, delta.y),
-            Axis::new(origin.z, direction.z, delta.z),
-        ];
-        Self {
-            inverse: [L::splat(x.inverse), L::splat(y.inverse), L::splat(z.inverse)],
-            near: [L::splat(x.near), L::splat(y.near), L::splat(z.near)],
-            far: [L::splat(x.far), L::splat(y.far), L::splat(z.far)],
-            negative: [x.inverse < 0.0, y.inverse < 0.0, z.inverse < 0.0],
-            // 4 roundings of an end (two here, two to spare), twice: on either side.
-            pad: L::splat(if padded { 8.0 * f32::EPSILON / 2.0 } else { 0.0 }),
-        }
-    }
-
-    /// Where the ray passes the nearer planes of one axis, and the farther ones.
-    #[inline(always)]
-    fn ends(&self, node: &Node, k: usize) -> (L, L) {
-        let [lower, upper] = &node.planes[k];
-        let (near, far) = if self.negative[k] { (upper, lower) } else { (lower, upper) };
-        (L::load(near).mul_sub(self.inverse[k], self.near[k]), L::load(far).mul_sub(self.inverse[k], self.far[k]))
+    pub(crate) fn new(origin: Vec3, direction: Vec3, delta: Vec3, padded: bool, t_min: f32) -> Self {
+        let pad = if padded { PAD } else { 0.0 };
+        // A longer reciprocal moves positive ends outward, and costs nothing.
+        let line = t_min < 0.0;
+        let far = if line { 1.0 } else { 1.0 + pad };
+        let (x0, x1) = axis(origin.x, direction.x, delta.x, far);
+        let (y0, y1) = axis(origin.y, direction.y, delta.y, far);
+        let (z0, z1) = axis(origin.z, direction.z, delta.z, far);
+        Self { near: [x0, y0, z0], far: [x1, y1, z1], line: line.then(|| L::splat(pad)) }
     }
 
     /// Which children the ray meets within `[t_min, t_max]`, and where it enters them.
     #[inline(always)]
     pub(crate) fn test(&self, node: &Node, t_min: L, t_max: L) -> (u32, L) {
-        let (near0, far0) = self.ends(node, 0);
-        let (near1, far1) = self.ends(node, 1);
-        let (near2, far2) = self.ends(node, 2);
-        let enter = near0.max(near1).max(near2.max(t_min));
-        let leave = far0.min(far1).min(far2);
-        // Of a missing child the far end is -infinity, and padded NaN: as the second operand it stays, and is no hit.
-        let leave = t_max.min(leave.add(leave.abs().mul(self.pad)));
-        (enter.le(leave), enter)
+        let [x, y, z] = &node.planes;
+        let enter = self.near[0].at(x).max(self.near[1].at(y)).max(self.near[2].at(z).max(t_min));
+        let mut leave = self.far[0].at(x).min(self.far[1].at(y)).min(self.far[2].at(z));
+        if let Some(pad) = self.line {
+            // Of a missing child the far end is -infinity, and padded NaN: as the second operand below it stays, and is
+            // no hit.
+            leave = leave.add(leave.abs().mul(pad));
+        }
+        (enter.le(t_max.min(leave)), enter)
     }
+}
+
+/// The nearer and the farther planes of one axis.
+#[inline(always)]
+fn axis<L: Lanes>(origin: f32, direction: f32, delta: f32, far: f32) -> (Ends<L>, Ends<L>) {
+    let direction = if direction.abs() < SMALLEST { SMALLEST.copysign(direction) } else { direction };
+    let inverse = 1.0 / direction;
+    let out = delta.copysign(direction);
+    // Going down, the ray enters through the upper planes.
+    let side = (direction.to_bits() >> 31) as usize;
+    (Ends::new(side, inverse, origin + out), Ends::new(1 - side, inverse * far, origin - out))
 }
 
 #[cfg(test)]
@@ -93,6 +98,7 @@ mod tests {
         origin: Vec3,
         direction: Vec3,
         padded: bool,
+        t_min: f32,
     }
 
     impl Work for Test<'_> {
@@ -100,8 +106,8 @@ mod tests {
         #[inline(always)]
         fn run<L: Lanes>(self) -> u32 {
             let delta = if self.padded { self.origin.abs() * 3e-7 + 1e-12 } else { Vec3::ZERO };
-            let boxes = Boxes::<L>::new(self.origin, self.direction, delta, self.padded);
-            boxes.test(self.node, L::splat(0.0), L::splat(f32::INFINITY)).0
+            let boxes = Boxes::<L>::new(self.origin, self.direction, delta, self.padded, self.t_min);
+            boxes.test(self.node, L::splat(self.t_min), L::splat(f32::INFINITY)).0
         }
     }
 
@@ -137,8 +143,9 @@ mod tests {
             let node = node(&vec![b; used]);
             let all = (1u32 << used) - 1;
             for level in Level::ALL {
-                for padded in [true, false] {
-                    let hits = run(Available::up_to(level), Test { node: &node, origin, direction, padded });
+                for (padded, t_min) in [(true, 0.0), (true, f32::NEG_INFINITY), (false, 0.0), (false, -1.0)] {
+                    let test = Test { node: &node, origin, direction, padded, t_min };
+                    let hits = run(Available::up_to(level), test);
                     prop_assert_eq!(hits & !all, 0, "{} missing children are met", level);
                     prop_assert!(!padded || hits == all, "{} {:b}", level, hits);
                 }

@@ -27,10 +27,17 @@ pub(crate) struct BoxRay {
     pub(crate) t_max: f32,
 }
 
+/// Tests triangles. A trait and not a closure, which could not be told to be inlined: into what is compiled for the
+/// level, or every call would save and load all registers.
+pub(crate) trait Visit<P> {
+    /// Gets a triangle's place and vertices. Answers with the new end of the interval if it has become shorter, or
+    /// breaks. Must be `#[inline(always)]`.
+    fn visit(&mut self, place: usize, triangle: &[Vec3; 3], probe: &mut P) -> ControlFlow<(), Option<f32>>;
+}
+
 /// Visits what the ray meets: nearer boxes first if `ORDERED`, else larger ones.
 ///
-/// `test` gets the place of each triangle that passes the filter and its vertices, and answers with the new end of the
-/// interval if it has become shorter, or breaks. Boxes that begin *beyond* the end are skipped; those that begin at it
+/// The visitor gets each triangle that passes the filter. Boxes that begin *beyond* the end are skipped; those that begin at it
 /// are visited, so that triangles at equal distance are all seen.
 #[inline(always)]
 pub(crate) fn traverse<L: Lanes, F: Filter<L>, P: Probe, const ORDERED: bool>(
@@ -38,12 +45,12 @@ pub(crate) fn traverse<L: Lanes, F: Filter<L>, P: Probe, const ORDERED: bool>(
     ray: &BoxRay,
     filter: &F,
     probe: &mut P,
-    mut test: impl FnMut(usize, [Vec3; 3], &mut P) -> ControlFlow<(), Option<f32>>,
+    visitor: &mut impl Visit<P>,
 ) -> ControlFlow<()> {
     if tree.root == Reference::NOTHING {
         return ControlFlow::Continue(());
     }
-    let boxes = Boxes::<L>::new(ray.origin, ray.direction, ray.delta, ray.padded);
+    let boxes = Boxes::<L>::new(ray.origin, ray.direction, ray.delta, ray.padded, ray.t_min);
     let t_min = L::splat(ray.t_min);
     let mut t_max = ray.t_max;
     let mut ends = L::splat(t_max);
@@ -68,11 +75,8 @@ pub(crate) fn traverse<L: Lanes, F: Filter<L>, P: Probe, const ORDERED: bool>(
             if ORDERED {
                 // Keys are ordered by the bits of distances, which must not be negative; what begins before 0 is all
                 // alike, and never beyond the end.
-                let mut keys = enter.max(L::splat(0.0)).pack(&node.children, hits);
-                let n = hits.count_ones() as usize;
-                sort::<P>(&mut keys, n);
-                current = Reference(keys[n - 1 & 7] as u32);
-                stack.push(&keys, n - 1);
+                let keys = enter.max(L::splat(0.0)).pack(&node.children, hits);
+                current = Reference(stack.push_all_but_nearest::<P>(keys, hits.count_ones() as usize) as u32);
             } else {
                 // The largest is the last.
                 let last = 31 - hits.leading_zeros();
@@ -84,12 +88,12 @@ pub(crate) fn traverse<L: Lanes, F: Filter<L>, P: Probe, const ORDERED: bool>(
         if current != Reference::NOTHING {
             let index = current.index();
             let block = &tree.blocks[index];
-            let mut lanes = filter.candidates(block);
+            let mut lanes = filter.candidates(block, t_min, ends);
             probe.block(|| block.count());
             while lanes != 0 {
                 let lane = lanes.trailing_zeros() as usize;
                 lanes &= lanes - 1;
-                if let Some(end) = test(index * 8 + lane, block.triangle(lane), probe)? {
+                if let Some(end) = visitor.visit(index * 8 + lane, &block.triangle(lane), probe)? {
                     t_max = end;
                     ends = L::splat(end);
                 }
@@ -102,43 +106,5 @@ pub(crate) fn traverse<L: Lanes, F: Filter<L>, P: Probe, const ORDERED: bool>(
                 break;
             }
         }
-    }
-}
-
-/// The nearest of the first `n` keys last.
-#[inline(always)]
-fn sort<P: Probe>(keys: &mut [u64; 8], n: usize) {
-    let mut order = |i: usize, j: usize| {
-        let (a, b) = (keys[i], keys[j]);
-        (keys[i], keys[j]) = (a.max(b), a.min(b));
-    };
-    match n {
-        2 => order(0, 1),
-        3 => {
-            order(0, 1);
-            order(1, 2);
-            order(0, 1);
-        }
-        4 => {
-            order(0, 1);
-            order(2, 3);
-            order(0, 2);
-            order(1, 3);
-            order(1, 2);
-        }
-        _ => {
-            for i in 1..n.min(8) {
-                let key = keys[i];
-                let mut k = i;
-                while k > 0 && keys[k - 1] < key {
-                    keys[k] = keys[k - 1];
-                    k -= 1;
-                }
-                keys[k] = key;
-            }
-        }
-    }
-    if P::REVERSED {
-        keys[..n.min(8)].reverse();
     }
 }

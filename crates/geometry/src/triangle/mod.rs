@@ -63,7 +63,7 @@ pub fn intersect<R: Real>(precision: Precision, vertices: [R::Vec3; 3], ray: &Ra
 ///
 /// It is formed from the two shortest edges, whose angle is nearest to a right one; then the error is that of the
 /// edges alone, and for `f32` vertices of similar magnitude the edges are exact. Zero for a triangle without area.
-#[inline]
+#[inline(always)]
 #[must_use]
 pub fn area_vector(v: [DVec3; 3]) -> DVec3 {
     let e = [v[2] - v[1], v[0] - v[2], v[1] - v[0]];
@@ -98,7 +98,7 @@ pub fn normal(v: [DVec3; 3]) -> Option<DVec3> {
 /// The ray parameter of a triangle's plane: `n.(v0 - o) / n.d`, in double precision.
 ///
 /// `None` when the triangle has no area or the ray lies parallel to it.
-#[inline]
+#[inline(always)]
 #[must_use]
 pub fn plane_parameter(v: [DVec3; 3], origin: DVec3, direction: DVec3) -> Option<f64> {
     let n = area_vector(v);
