@@ -164,6 +164,15 @@ impl Transform {
         self.inverse.abs() * (from.abs() * gamma(4))
     }
 
+    /// Bound on how far, in each axis and relative to the distance from the origin of the object, a point is off in the
+    /// world when a number of its image in the object's space is off by `64 u` of the largest. The inverse's own error is
+    /// included: in contrast to [`Transform::point_to_object_error`] this compares with what [`Transform::point`] maps.
+    #[must_use]
+    pub fn round_trip(&self) -> f64 {
+        let rows = |m: DMat3| (m.x_axis.abs() + m.y_axis.abs() + m.z_axis.abs()).max_element();
+        rows(self.linear * self.inverse - DMat3::IDENTITY) + rows(self.linear) * rows(self.inverse) * gamma(72)
+    }
+
     /// A box in the world around the image of `aabb`, padded for every rounding. Infinite boxes stay infinite, empty
     /// ones empty.
     #[must_use]

@@ -25,7 +25,8 @@ pub struct TriangleHit<R: Real> {
     pub v: R,
 }
 
-/// The hit of a ray with a triangle by the test of a tier, rounded to `R`.
+/// The hit of a ray with a triangle by the test of a tier, rounded to `R`. A hit beyond the largest number of `R` is
+/// none, nor is one with a vertex that is not finite.
 ///
 /// * [`Precision::Fast`] is [`fast()`].
 /// * [`Precision::Robust`] is [`watertight()`] in `R`.
@@ -42,7 +43,7 @@ pub struct TriangleHit<R: Real> {
 /// ```
 #[must_use]
 pub fn intersect<R: Real>(precision: Precision, vertices: [R::Vec3; 3], ray: &Ray<R>) -> Option<TriangleHit<R>> {
-    match precision {
+    let hit = match precision {
         Precision::Fast => fast(vertices, ray),
         Precision::Robust => watertight(vertices, ray),
         Precision::Double => {
@@ -56,7 +57,8 @@ pub fn intersect<R: Real>(precision: Precision, vertices: [R::Vec3; 3], ray: &Ra
             let t = if single { R::from_f32(ray.t_f32(&hit)) } else { R::from_f64(hit.t) };
             Some(TriangleHit { t, u: R::from_f64(hit.u), v: R::from_f64(hit.v) })
         }
-    }
+    };
+    hit.filter(|hit| hit.t.is_finite())
 }
 
 /// The vector `(v1 - v0) x (v2 - v0)` in double precision: normal by winding, as long as twice the area.

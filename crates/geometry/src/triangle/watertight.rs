@@ -243,5 +243,5 @@ pub fn watertight<R: Real>(vertices: [R::Vec3; 3], ray: &Ray<R>) -> Option<Trian
     let w = Shear::new(direction).weights(relative)?;
     let t = plane_parameter(relative.map(Vector3::to_f64), glam::DVec3::ZERO, direction.to_f64())?;
     let t = R::from_f64(t * after.to_f64() * before.to_f64() / length.to_f64());
-    ray.contains(t).then_some(TriangleHit { t, u: w.u, v: w.v })
+    (t.is_finite() && ray.contains(t)).then_some(TriangleHit { t, u: w.u, v: w.v })
 }
