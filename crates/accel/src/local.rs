@@ -87,7 +87,8 @@ pub(crate) struct LocalRay {
 }
 
 impl LocalRay {
-    /// Enters the object. `None` where the ray is not finite there.
+    /// Enters the object. `None` where the ray is not finite there, or its direction shorter or longer than about
+    /// 2^-511 or 2^511: numbers that have no room for products.
     #[inline(always)]
     pub(crate) fn enter(ray: &Ray<f64>, transform: &Transform, object: &Extent) -> Option<Self> {
         let Extent { center, half } = *object;
@@ -95,7 +96,7 @@ impl LocalRay {
         let direction = transform.vector_to_object(ray.direction);
         let length = direction.abs().max_element().power_of_two_below();
         let direction = direction * (1.0 / length);
-        if !(origin.is_finite() && direction.is_finite() && direction != DVec3::ZERO) {
+        if !(origin.is_finite() && direction.is_finite() && (1.0..2.0).contains(&direction.abs().max_element())) {
             return None;
         }
         let relative = origin - center;

@@ -55,6 +55,8 @@ struct Inner {
     /// Instances of models with shapes of no finite box, which are tested outside the tree.
     unbounded: Vec<u32>,
     bounds: Aabb<f64>,
+    /// The largest [`round_trip`](firsthit_geometry::transform::Transform::round_trip) of an instance.
+    round_trip: f64,
     stats: SceneStats,
 }
 
@@ -95,8 +97,9 @@ impl Scene {
             .collect();
         let order = topology.order.iter().map(|&i| bounded[i as usize]).collect();
 
-        let mut inner =
-            Inner { options, models, instances, tree, order, unbounded, bounds, stats: SceneStats::default() };
+        let round_trip = instances.iter().fold(0.0, |most: f64, i| most.max(i.transform.round_trip()));
+        let stats = SceneStats::default();
+        let mut inner = Inner { options, models, instances, tree, order, unbounded, bounds, round_trip, stats };
         inner.stats = inner.stats(topology.depth());
         Ok(Self { inner: Arc::new(inner) })
     }
@@ -193,10 +196,21 @@ impl Scene {
         crossings: Crossings,
         collector: &mut (dyn Collector + '_),
     ) -> ControlFlow<()> {
+        self.collect_watched(ray, crossings, collector, &mut Off)
+    }
+
+    /// The same with a probe.
+    pub(crate) fn collect_watched<P: Probe>(
+        &self,
+        ray: &Ray<f64>,
+        crossings: Crossings,
+        collector: &mut (dyn Collector + '_),
+        probe: &mut P,
+    ) -> ControlFlow<()> {
         let mut collector = Dyn(collector);
         match crossings {
-            Crossings::Surfaces => self.inner.trace::<true, _, _>(ray, &mut collector, &mut Off),
-            Crossings::Triangles => self.inner.trace::<false, _, _>(ray, &mut collector, &mut Off),
+            Crossings::Surfaces => self.inner.trace::<true, _, _>(ray, &mut collector, probe),
+            Crossings::Triangles => self.inner.trace::<false, _, _>(ray, &mut collector, probe),
         }
     }
 
@@ -317,12 +331,21 @@ impl Inner {
             _ => {
                 let slabs = Slabs::new(ray.origin, ray.direction);
                 if K::PADDED {
+                    let slabs = slabs.widened(self.entering(ray));
                     traverse::<true, _, _, _>(&self.tree, &slabs, before, t_max, probe, leaf)
                 } else {
                     traverse::<false, _, _, _>(&self.tree, &slabs, before, t_max, probe, leaf)
                 }
             }
         }
+    }
+
+    /// How far from the ray, in each axis, the ray may lie that an instance's tests see: it is rounded on its way there,
+    /// which matters from far away. For what is rounded near the object its box is padded.
+    fn entering(&self, ray: &Ray<f64>) -> DVec3 {
+        // Some eight roundings on entering and 32 in the shift and the tests, see `LocalRay`: less than 64.
+        let farthest = (ray.origin - self.bounds.min).abs().max((ray.origin - self.bounds.max).abs()).max_element();
+        DVec3::splat(farthest * self.round_trip)
     }
 
     fn stats(&self, depth: u32) -> SceneStats {

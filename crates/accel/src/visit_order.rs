@@ -2,8 +2,9 @@
 
 use firsthit_geometry::Ray;
 
+use crate::query::Any;
 use crate::stats::{Exhaustive, FarFirst, Off};
-use crate::{Hit, Scene};
+use crate::{Crossings, Hit, Scene};
 
 /// How a traversal goes about it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,5 +27,23 @@ impl Scene {
             VisitOrder::FarFirst => self.closest(ray, &mut FarFirst),
             VisitOrder::Exhaustive => self.closest(ray, &mut Exhaustive),
         }
+    }
+
+    /// [`Scene::all_hits`] without any box test: the same hits, in no particular order.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn all_hits_exhaustively(&self, ray: &Ray<f64>, crossings: Crossings) -> Vec<Hit> {
+        let mut hits = Vec::new();
+        let keep = |hit: &Hit| {
+            hits.push(*hit);
+            false
+        };
+        let mut all = Any { t_min: ray.t_min, t_max: ray.t_max, source: None, accept: keep };
+        // It never breaks, since nothing is accepted.
+        let _ = self.collect_watched(ray, crossings, &mut all, &mut Exhaustive);
+        for hit in &mut hits {
+            hit.normal = self.world_normal(hit);
+        }
+        hits
     }
 }

@@ -9,7 +9,10 @@ mod balanced;
 mod emit;
 mod stall;
 
+use std::borrow::Cow;
+
 use firsthit_geometry::Aabb;
+use glam::Vec3;
 use obvhs::{BvhBuildParams, bvh2::builder::build_bvh2};
 
 use crate::BuildQuality;
@@ -52,7 +55,7 @@ pub(crate) struct Topology {
 }
 
 impl Topology {
-    /// A tree over finite boxes, at most `u32::MAX / 2` of them, none empty.
+    /// A tree over boxes, at most `u32::MAX / 2` of them, none empty.
     pub(crate) fn new(boxes: &[Aabb<f32>], quality: BuildQuality) -> Self {
         Self::with(boxes, parameters(quality))
     }
@@ -69,6 +72,7 @@ impl Topology {
     }
 
     fn with(boxes: &[Aabb<f32>], parameters: BvhBuildParams) -> Self {
+        let boxes = &*tame(boxes);
         if !stall::stalls(boxes) {
             let items: Vec<obvhs::aabb::Aabb> =
                 boxes.iter().map(|b| obvhs::aabb::Aabb::new(b.min.into(), b.max.into())).collect();
@@ -97,6 +101,20 @@ impl Topology {
     }
 }
 
+/// Boxes whose areas `f32` can hold: where costs overflow, obvhs joins boxes with themselves and indexes out of bounds.
+/// Only the tree's shape comes from them.
+fn tame(boxes: &[Aabb<f32>]) -> Cow<'_, [Aabb<f32>]> {
+    const MOST: f32 = (1u64 << 60) as f32;
+    let within = |p: Vec3| p.abs().cmple(Vec3::splat(MOST)).all();
+    if boxes.iter().all(|b| within(b.min) && within(b.max)) {
+        return Cow::Borrowed(boxes);
+    }
+    // The largest float becomes 2^60; infinite ones too, and what is not a number becomes some number.
+    let scale = MOST / f32::MAX;
+    let small = |p: Vec3| (p * scale).max(Vec3::splat(-MOST)).min(Vec3::splat(MOST));
+    Cow::Owned(boxes.iter().map(|b| Aabb::new(small(b.min), small(b.max))).collect())
+}
+
 fn parameters(quality: BuildQuality) -> BvhBuildParams {
     match quality {
         BuildQuality::Fast => BvhBuildParams::fast_build(),
@@ -109,7 +127,6 @@ fn parameters(quality: BuildQuality) -> BvhBuildParams {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::Vec3;
 
     /// Every primitive is in exactly one leaf, indices grow downwards, and the depth is bounded.
     fn check(boxes: &[Aabb<f32>], quality: BuildQuality) -> Topology {
@@ -133,6 +150,19 @@ mod tests {
 
     fn cube(center: Vec3, half: f32) -> Aabb<f32> {
         Aabb::new(center - half, center + half)
+    }
+
+    /// Of such, obvhs made no tree: it stopped at an index out of bounds.
+    #[test]
+    fn boxes_beyond_the_range_of_areas() {
+        let far = [1e25, 1e30, f32::MAX, f32::INFINITY, f32::NAN];
+        for n in 1..40 {
+            let boxes: Vec<_> =
+                (0..n).map(|i| Aabb::new(Vec3::splat(-far[i % 5]), Vec3::splat(far[i * i % 5]))).collect();
+            for q in [BuildQuality::Fast, BuildQuality::Balanced, BuildQuality::High] {
+                check(&boxes, q);
+            }
+        }
     }
 
     #[test]
