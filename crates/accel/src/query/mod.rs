@@ -25,8 +25,10 @@ pub(crate) type Candidate = Hit;
 impl Candidate {
     #[inline(always)]
     pub(crate) fn new(instance: u32, geometry: u32, primitive: u32, t: f64, u: f32, v: f32) -> Self {
-        // -0 becomes 0, so that lists which are sorted by bits agree with comparisons about what is equally near.
-        Self { id: HitId { instance, geometry, primitive }, t: t + 0.0, u, v, normal: DVec3::ZERO }
+        // -0 becomes 0, so that lists which are sorted by bits agree with comparisons about what is equally near. What is
+        // beyond the largest number is in no interval.
+        let t = if t.is_finite() { t + 0.0 } else { f64::NAN };
+        Self { id: HitId { instance, geometry, primitive }, t, u, v, normal: DVec3::ZERO }
     }
 }
 
