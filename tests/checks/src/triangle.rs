@@ -4,8 +4,8 @@ use firsthit_geometry::exact::{ExactHit, ExactRay};
 use firsthit_geometry::{Precision, Ray, Real, Vector3, triangle};
 use glam::DVec3;
 
+use crate::bytes::Bytes;
 use crate::exact::{self, Exact};
-use crate::{TIERS, bytes::Bytes};
 
 /// A tetrahedron and a ray. Each face: no panic, no NaN; a hit lies in the interval and on the triangle; the exact test
 /// is right to the last bit, and the others where their arithmetic leaves a margin. All of it: crossed an even number of
@@ -45,7 +45,7 @@ fn tiers<R: Real>(face: [DVec3; 3], ray: &Ray<f64>, context: &dyn Fn() -> String
         t_min: R::from_f64(ray.t_min),
         t_max: R::from_f64(ray.t_max),
     };
-    for precision in TIERS {
+    for precision in Precision::ALL {
         let Some(hit) = triangle::intersect(precision, v, &cast) else { continue };
         let say = || format!("{precision} {hit:?} {}", context());
         assert!(cast.is_valid(), "{}", say());
@@ -59,7 +59,7 @@ fn tiers<R: Real>(face: [DVec3; 3], ray: &Ray<f64>, context: &dyn Fn() -> String
     }
     let line = cast.with_interval(-R::INFINITY, R::INFINITY);
     let truth = exact::line_triangle(ray, face);
-    for precision in TIERS.into_iter().filter(|p| *p != Precision::Fast) {
+    for precision in Precision::ALL.into_iter().filter(|p| *p != Precision::Fast) {
         let digits = if precision == Precision::Robust && R::UNIT_ROUNDOFF.to_f64() > 1e-10 { 24 } else { 53 };
         if let Some(inside) = clear(face, ray, digits)
             && truth.as_ref().is_none_or(|h| h.t.cmp_float(1e30).is_lt() && h.t.cmp_float(-1e30).is_gt())
