@@ -29,6 +29,8 @@ pub struct Decision {
     pub margin_f32: f64,
     /// The same with the differences as terms, as `f64` has the ray exactly.
     pub margin_f64: f64,
+    /// The part of `margin_f32` of each edge, by the vertex opposite to it.
+    pub edges: [f64; 3],
     /// Condition of `t`: sum of the absolute terms of its numerator over its magnitude, plus that of its denominator.
     /// A backward-stable evaluation of unit roundoff u errs by at most `16 kappa u` relative. Infinite for t = 0.
     pub kappa: f64,
@@ -51,10 +53,9 @@ impl Decision {
         // With all terms of the coordinates: |p| + |o| for p - o.
         let coarse = v.map(|p| p.abs() + ray.origin.abs());
         let sizes = [(1, 2), (2, 0), (0, 1)].map(|(i, j)| size(d.abs(), coarse[i], coarse[j]));
-        let least = |sizes: [f64; 3]| {
-            let relative = |k: usize| if sizes[k] > 0.0 { orientation * edges[k].0 / sizes[k] } else { 0.0 };
-            relative(0).min(relative(1)).min(relative(2))
-        };
+        let relative =
+            |sizes: [f64; 3]| [0, 1, 2].map(|k| if sizes[k] > 0.0 { orientation * edges[k].0 / sizes[k] } else { 0.0 });
+        let least = |margins: [f64; 3]| margins[0].min(margins[1]).min(margins[2]);
 
         let (e1, e2) = (v[1] - v[0], v[2] - v[0]);
         let (numerator, denominator) = (triple(a, e1, e2), triple(d, e1, e2));
@@ -66,8 +67,9 @@ impl Decision {
         };
         let interval = end(t - ray.t_min, ray.t_min).min(end(ray.t_max - t, ray.t_max));
         Self {
-            margin_f32: least(sizes).min(interval),
-            margin_f64: least(edges.map(|e| e.1)).min(interval),
+            margin_f32: least(relative(sizes)).min(interval),
+            margin_f64: least(relative(edges.map(|e| e.1))).min(interval),
+            edges: relative(sizes),
             kappa: if kappa.is_finite() { kappa } else { f64::INFINITY },
         }
     }

@@ -108,7 +108,7 @@ impl Errors {
                 let all = exact.all_hits(ray, Crossings::Triangles);
                 let clearest = all.iter().chain([first]).map(|h| level(subject, ray, h)).min();
                 self.false_misses[clearest.unwrap_or(Level::Exact as usize)] += 1;
-                self.slipped += u64::from(hit_all_around(exact, ray, first.t, f64::INFINITY));
+                self.slipped += u64::from(slipped(subject, exact, ray, first, f64::INFINITY));
             }
             (Some(hit), Some(first)) => {
                 // One of several that are exactly nearest is as good as the first of them.
@@ -119,7 +119,7 @@ impl Errors {
                     self.wrong_ids += 1;
                     // Clearly behind: at an edge the neighbour's t differs by roundings.
                     let behind = hit.t - first.t > 2.0 * NEARBY * first.t.abs();
-                    self.slipped += u64::from(behind && hit_all_around(exact, ray, first.t, hit.t));
+                    self.slipped += u64::from(behind && slipped(subject, exact, ray, first, hit.t));
                 }
             }
         }
@@ -207,6 +207,16 @@ impl Errors {
 pub fn lost_by_traversal(scene: &Scene, rays: &[Ray<f64>]) -> usize {
     let hits = |ray: &&Ray<f64>| scene.closest_hit_in_order(ray, firsthit_accel::VisitOrder::Exhaustive).is_some();
     rays.par_iter().filter(hits).count()
+}
+
+/// Whether a ray went through a surface that has no end near its exact first hit, on to `beyond`.
+fn slipped(subject: &Subject, exact: &Scene, ray: &Ray<f64>, first: &Hit, beyond: f64) -> bool {
+    let triangle = subject.triangle(first.id);
+    let ends = triangle.is_some_and(|triangle| {
+        let near = Decision::new(&triangle, ray).map_or([true; 3], |d| d.edges.map(|e| e < NEARBY));
+        subject.ends_at(&triangle, near)
+    });
+    !ends && hit_all_around(exact, ray, first.t, beyond)
 }
 
 /// Whether rays that differ from `ray` by some roundings of f32 all hit something near `t`, and before the middle

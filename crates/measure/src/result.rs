@@ -91,8 +91,8 @@ pub struct TierRow {
     /// Another triangle than any of the exactly nearest.
     pub wrong_ids: u64,
     /// Rays that slipped through a surface: it was missed, or something behind it hit, though all rays close around hit
-    /// it. From inside a closed model these are the leaks; here they count for open models too. What rounding decides at
-    /// a silhouette is not among them.
+    /// it, and the mesh does not end there. From inside a closed model these are the leaks; here they count for open
+    /// models too. What rounding decides at a silhouette, a rim or a crack in the mesh is not among them.
     pub slipped: u64,
     /// Error of t against the exact one, in f32 ulps: median, 99 %, largest.
     pub t_ulp_p50: f64,

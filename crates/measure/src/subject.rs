@@ -1,6 +1,7 @@
 //! What is measured: a model with what a measurement must know of it.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
+use std::sync::OnceLock;
 
 use firsthit_accel::HitId;
 use firsthit_geometry::mesh::MeshReport;
@@ -24,6 +25,15 @@ pub struct Subject {
     runs: Vec<(u32, u32, u64)>,
     /// Triangles as instanced.
     count: u64,
+    /// Made when it is first asked for.
+    borders: OnceLock<Borders>,
+}
+
+/// Where surfaces end: edges that one triangle alone has, and their vertices; as hashes of positions in the world.
+#[derive(Clone, Debug, Default)]
+struct Borders {
+    edges: HashSet<u64>,
+    vertices: HashSet<u64>,
 }
 
 /// A triangle of a model and where it is placed.
@@ -57,7 +67,7 @@ impl Subject {
             }
         }
         let closed = encloses_space(&desc);
-        Self { name: name.into(), desc, closed, runs, count }
+        Self { name: name.into(), desc, closed, runs, count, borders: OnceLock::new() }
     }
 
     /// The model that needs no file: a closed bumpy sphere of 81 920 triangles.
@@ -88,6 +98,49 @@ impl Subject {
         let (instance, geometry, before) = *self.runs.get(self.runs.partition_point(|r| r.2 <= k).checked_sub(1)?)?;
         self.triangle(HitId { instance, geometry, primitive: (k - before) as u32 })
     }
+}
+
+impl Subject {
+    /// Whether a surface ends at a triangle where `near` says which of its edges (by the vertex opposite) are meant: one
+    /// of those has no neighbour, or the vertex between two of them lies at the end of such an edge. So it is also at a
+    /// vertex in the middle of another triangle's edge, where a mesh is cracked by the rounding of that vertex.
+    #[must_use]
+    pub fn ends_at(&self, triangle: &Placed, near: [bool; 3]) -> bool {
+        let borders = self.borders.get_or_init(|| self.borders());
+        let v = triangle.in_world().map(vertex_key);
+        (0..3).any(|k| {
+            let (next, last) = ((k + 1) % 3, (k + 2) % 3);
+            let edge = near[k] && borders.edges.contains(&edge_key(v[next], v[last]));
+            // Vertex k is where the edges opposite to the other two meet.
+            edge || (near[next] && near[last] && borders.vertices.contains(&v[k]))
+        })
+    }
+
+    fn borders(&self) -> Borders {
+        let corners = || (0..self.count).filter_map(|k| Some(self.nth(k)?.in_world().map(vertex_key)));
+        let edges_of = |v: [u64; 3]| [[v[0], v[1]], [v[1], v[2]], [v[2], v[0]]];
+        let mut keys: Vec<u64> = corners().flat_map(edges_of).map(|[a, b]| edge_key(a, b)).collect();
+        keys.sort_unstable();
+        let alone = keys.chunk_by(|a, b| a == b).filter(|same| same.len() == 1).map(|same| same[0]);
+        let mut borders = Borders { edges: alone.collect(), vertices: HashSet::new() };
+        let ends = corners().flat_map(edges_of).filter(|[a, b]| borders.edges.contains(&edge_key(*a, *b)));
+        borders.vertices = ends.flatten().collect();
+        borders
+    }
+}
+
+fn mixed(x: u64, y: u64) -> u64 {
+    let x = (x ^ y.rotate_left(32)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    (x ^ (x >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9) ^ (x >> 32)
+}
+
+fn vertex_key(p: DVec3) -> u64 {
+    // -0 is where 0 is.
+    (p + 0.0).to_array().into_iter().fold(0, |key, x| mixed(key, x.to_bits()))
+}
+
+fn edge_key(a: u64, b: u64) -> u64 {
+    mixed(a.min(b), a.max(b))
 }
 
 /// A scene of one mesh, where it stands.
@@ -150,6 +203,25 @@ mod tests {
         assert_eq!(second.in_world()[0], first.in_world()[0] + DVec3::X);
         assert!(subject.nth(40).is_none());
         assert!(subject.closed);
+    }
+
+    #[test]
+    fn surfaces_end_at_edges_without_neighbour_and_at_cracks() {
+        // Two triangles above the edge from (0, 0) to (2, 0) meet at (1, 0); below there is one.
+        let at = |x: f32, y: f32| Vec3::new(x, y, 0.0);
+        let mesh = Mesh {
+            positions: vec![at(0.0, 0.0), at(1.0, 0.0), at(2.0, 0.0), at(1.0, 1.0), at(1.0, -1.0)],
+            triangles: vec![[0, 1, 3], [1, 2, 3], [0, 4, 2]],
+        };
+        let subject = Subject::new("cracked", desc_of(&mesh));
+        let first = subject.nth(0).unwrap();
+        // Edge 1-3 is shared with the second triangle, 0-1 with none.
+        assert!(!subject.ends_at(&first, [true, false, false]));
+        assert!(subject.ends_at(&first, [false, false, true]));
+        assert!(!subject.ends_at(&first, [false; 3]));
+        assert!(subject.ends_at(&first, [true, false, true]), "the vertex in the middle of the lower edge");
+        let closed = Subject::new("closed", desc_of(&icosphere(1)));
+        assert!((0..80).all(|k| !closed.ends_at(&closed.nth(k).unwrap(), [true; 3])));
     }
 
     #[test]

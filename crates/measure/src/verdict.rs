@@ -99,8 +99,10 @@ pub fn verdict(rows: &[TierRow], model: &str) -> String {
     }
     text += &format!(", t within {} ulp.", short(best.t_ulp));
     if best.any_wrong > 0 {
-        text +=
-            &format!(" At silhouettes and rims rounding decides {} of them otherwise than exactly.", best.any_wrong);
+        text += &format!(
+            " At silhouettes, rims and cracks rounding decides {} of them otherwise than exactly.",
+            best.any_wrong
+        );
     }
     if !cheapest.is_clean() {
         text += &format!(" With {}, {}.", cheapest.tier, cheapest.faults());
