@@ -31,7 +31,7 @@ pub fn mesh(data: &[u8]) -> bool {
     let quality = [BuildQuality::Balanced, BuildQuality::Fast, BuildQuality::High][bytes.below(3)];
     let parts: Vec<Part> = (0..1 + bytes.below(2)).map(|_| part(&mut bytes)).collect();
     let places: Vec<DAffine3> = (0..1 + bytes.below(3)).map(|_| place(&mut bytes)).collect();
-    let rays: Vec<Ray<f64>> = (0..5)
+    let rays: Vec<Ray<f64>> = (0..4)
         .map(|_| {
             let target = aim(&parts, &mut bytes);
             let place = places[bytes.below(places.len())];

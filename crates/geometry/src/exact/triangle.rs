@@ -234,7 +234,8 @@ impl ExactRay {
             fallback = true;
             self.locate(&vertices, 0.5 * (first + last)).to_f64()
         });
-        if t < self.ray.t_min || t > self.ray.t_max.min(t_max) {
+        // Nothing beyond the largest number is a hit, whatever the interval.
+        if !t.is_finite() || t < self.ray.t_min || t > self.ray.t_max.min(t_max) {
             return None;
         }
         if t == self.ray.t_min || t == self.ray.t_max {
