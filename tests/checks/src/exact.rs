@@ -172,7 +172,7 @@ impl Quotient {
 
     /// Against another.
     #[must_use]
-    pub fn cmp(&self, other: &Self) -> Ordering {
+    pub fn compare(&self, other: &Self) -> Ordering {
         (&self.num * &other.den).cmp(&(&other.num * &self.den))
     }
 }
@@ -263,7 +263,7 @@ impl Root<'_> {
 
     /// Against an exact number, by the sign of the polynomial there.
     #[must_use]
-    pub fn cmp(&self, x: &Exact) -> Ordering {
+    pub fn compare(&self, x: &Exact) -> Ordering {
         let [a, b, c] = self.equation;
         let slope = &(a * x) + b;
         let value = &(&(&slope + b) * x) + c;
@@ -299,7 +299,7 @@ impl Root<'_> {
     /// Against a float, which may be infinite.
     #[must_use]
     pub fn cmp_float(&self, x: f64) -> Ordering {
-        if x.is_infinite() { 0.0_f64.total_cmp(&x) } else { self.cmp(&Exact::new(x)) }
+        if x.is_infinite() { 0.0_f64.total_cmp(&x) } else { self.compare(&Exact::new(x)) }
     }
 }
 
@@ -329,7 +329,7 @@ mod tests {
             assert_eq!(roots.len(), 2);
             for (root, t) in roots.iter().zip([-3.0, 1.0]) {
                 for x in [-4.0, -3.0, -1.0, 0.5, 1.0, 7.0] {
-                    assert_eq!(Some(root.cmp(&Exact::new(x))), t.partial_cmp(&x), "{t} {x}");
+                    assert_eq!(Some(root.compare(&Exact::new(x))), t.partial_cmp(&x), "{t} {x}");
                 }
             }
         }

@@ -260,7 +260,7 @@ impl Answers {
             }
         }
         // Stable: of equal ones the first.
-        truth.sort_by(|a, b| a.1.t.cmp(&b.1.t));
+        truth.sort_by(|a, b| a.1.t.compare(&b.1.t));
         let crossed: Vec<_> = truth.iter().filter(|t| t.1.crosses).cloned().collect();
         for (hits, truth) in [(&self.triangles, truth), (&self.surfaces, crossed)] {
             let ids = |h: &Hit| [h.id.geometry as usize, h.id.primitive as usize];

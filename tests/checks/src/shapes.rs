@@ -127,9 +127,9 @@ fn check<R: Real>(shape: &Shape<R>, ray: &Ray<R>) {
         assert_eq!(roots.len(), hits.len(), "{hits:?} {}", say());
         for (root, h) in roots.iter().zip(&hits) {
             let near = if R::UNIT_ROUNDOFF.to_f64() < 1e-10 {
-                exact::is_nearest(h.hit.t.to_f64(), |x| root.cmp(x))
+                exact::is_nearest(h.hit.t.to_f64(), |x| root.compare(x))
             } else {
-                exact::is_nearest_f32(h.hit.t.to_f32(), |x| root.cmp(x))
+                exact::is_nearest_f32(h.hit.t.to_f32(), |x| root.compare(x))
             };
             assert!(near, "{h:?} {}", say());
         }
