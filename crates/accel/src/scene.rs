@@ -13,7 +13,7 @@ use crate::kernel::{Double, Exact, Fast, Kernel, Robust};
 use crate::layout::{Bvh2, Tree};
 use crate::local::LocalRay;
 use crate::model::{Model, PrimitiveId, Surface, limit};
-use crate::query::{Any, Closest, Collector, Dyn};
+use crate::query::{Any, Closest, Collect, Collector, Dyn};
 use crate::stats::{Off, Probe};
 use crate::traverse::traverse;
 use crate::{BuildError, BuildOptions, Crossings, Geometry, Guards, Hit, HitId, TraversalCounts};
@@ -124,17 +124,16 @@ impl Scene {
         accept: impl FnMut(&Hit) -> bool,
     ) -> Option<Hit> {
         let order = |a: &Hit, b: &Hit| self.order(ray, a, b);
-        let (t_min, t_max) = (ray.t_min, ray.t_max);
-        let mut closest = Closest { t_min, t_max, source: self.flat(source), accept, order, best: None };
+        let mut closest = Collect::new(ray, self.flat(source), accept, Closest { order, best: None });
         // It never breaks: the nearest hit is known at the end only.
         let _ = self.collect(ray, Crossings::Triangles, &mut closest);
-        self.finished(closest.best)
+        self.finished(closest.take.best)
     }
 
     /// Whether anything lies in the ray's closed interval: true exactly when [`Scene::closest_hit`] finds something.
     #[must_use]
     pub fn any_hit(&self, ray: &Ray<f64>) -> bool {
-        let mut any = Any { t_min: ray.t_min, t_max: ray.t_max, source: None, accept: |_: &Hit| true };
+        let mut any = Collect::new(ray, None, |_| true, Any);
         self.inner.trace::<false, _, _>(ray, &mut any, &mut Off).is_break()
     }
 
@@ -142,7 +141,7 @@ impl Scene {
     /// about every hit exactly once.
     #[must_use]
     pub fn any_hit_filtered(&self, ray: &Ray<f64>, source: Option<HitId>, accept: impl FnMut(&Hit) -> bool) -> bool {
-        let mut any = Any { t_min: ray.t_min, t_max: ray.t_max, source: self.flat(source), accept };
+        let mut any = Collect::new(ray, self.flat(source), accept, Any);
         self.collect(ray, Crossings::Triangles, &mut any).is_break()
     }
 
@@ -182,10 +181,10 @@ impl Scene {
 
     /// [`Scene::closest_hit`] with a probe: compiled for this collector alone, since it is what most rays ask.
     pub(crate) fn closest<P: Probe>(&self, ray: &Ray<f64>, probe: &mut P) -> Option<Hit> {
-        let (accept, order) = (|_: &Hit| true, |a: &Hit, b: &Hit| self.order(ray, a, b));
-        let mut closest = Closest { t_min: ray.t_min, t_max: ray.t_max, source: None, accept, order, best: None };
+        let order = |a: &Hit, b: &Hit| self.order(ray, a, b);
+        let mut closest = Collect::new(ray, None, |_| true, Closest { order, best: None });
         let _ = self.inner.trace::<false, _, _>(ray, &mut closest, probe);
-        self.finished(closest.best)
+        self.finished(closest.take.best)
     }
 
     /// Offers all hits to any collector: called through a pointer, so that the traversals of all tiers are not compiled

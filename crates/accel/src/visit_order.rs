@@ -2,7 +2,7 @@
 
 use firsthit_geometry::Ray;
 
-use crate::query::Any;
+use crate::query::{All, Collect};
 use crate::stats::{Exhaustive, FarFirst, Off};
 use crate::{Crossings, Hit, Scene};
 
@@ -34,12 +34,8 @@ impl Scene {
     #[must_use]
     pub fn all_hits_exhaustively(&self, ray: &Ray<f64>, crossings: Crossings) -> Vec<Hit> {
         let mut hits = Vec::new();
-        let keep = |hit: &Hit| {
-            hits.push(*hit);
-            false
-        };
-        let mut all = Any { t_min: ray.t_min, t_max: ray.t_max, source: None, accept: keep };
-        // It never breaks, since nothing is accepted.
+        let mut all = Collect::new(ray, None, |_| true, All(&mut hits));
+        // It never breaks.
         let _ = self.collect_watched(ray, crossings, &mut all, &mut Exhaustive);
         for hit in &mut hits {
             hit.normal = self.world_normal(hit);

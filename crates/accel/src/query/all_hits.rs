@@ -5,33 +5,16 @@ use core::ops::ControlFlow;
 use firsthit_geometry::Ray;
 use rayon::prelude::*;
 
-use super::{Candidate, Collector, Crossings, batch::CHUNK};
+use super::{Collect, Crossings, Take, batch::CHUNK};
 use crate::{Hit, HitId, Scene};
 
-/// Keeps every accepted hit.
-struct All<'a, F> {
-    t_min: f64,
-    t_max: f64,
-    source: Option<HitId>,
-    accept: F,
-    hits: &'a mut Vec<Hit>,
-}
+/// Keeps every hit.
+pub(crate) struct All<'a>(pub(crate) &'a mut Vec<Hit>);
 
-impl<F: FnMut(&Hit) -> bool> Collector for All<'_, F> {
+impl Take for All<'_> {
     #[inline(always)]
-    fn t_min(&self) -> f64 {
-        self.t_min
-    }
-    #[inline(always)]
-    fn t_max(&self) -> f64 {
-        self.t_max
-    }
-    #[inline(always)]
-    fn offer(&mut self, hit: Candidate) -> ControlFlow<(), bool> {
-        let inside = self.t_min <= hit.t && hit.t <= self.t_max;
-        if inside && self.source != Some(hit.id) && (self.accept)(&hit) {
-            self.hits.push(hit);
-        }
+    fn take(&mut self, hit: Hit, _: &mut f64) -> ControlFlow<(), bool> {
+        self.0.push(hit);
         // Never "taken": of a shape the next root is wanted too.
         ControlFlow::Continue(false)
     }
@@ -139,10 +122,10 @@ impl Scene {
         hits: &mut Vec<Hit>,
     ) {
         hits.clear();
-        let mut all = All { t_min: ray.t_min, t_max: ray.t_max, source: self.flat(source), accept, hits };
+        let mut all = Collect::new(ray, self.flat(source), accept, All(hits));
         // It never breaks.
         let _ = self.collect(ray, crossings, &mut all);
-        let hits = all.hits;
+        let hits = all.take.0;
         hits.sort_by(|a, b| self.order(ray, a, b));
         for hit in hits {
             hit.normal = self.world_normal(hit);

@@ -5,31 +5,16 @@ use core::ops::ControlFlow;
 use firsthit_geometry::Ray;
 use rayon::prelude::*;
 
-use super::{Candidate, Collector, Crossings, batch::CHUNK};
+use super::{Collect, Crossings, Take, batch::CHUNK};
 use crate::{Hit, HitId, Scene};
 
-/// Counts the accepted hits.
-struct Count<F> {
-    t_min: f64,
-    t_max: f64,
-    source: Option<HitId>,
-    accept: F,
-    count: u32,
-}
+/// Counts the hits.
+struct Count(u32);
 
-impl<F: FnMut(&Hit) -> bool> Collector for Count<F> {
+impl Take for Count {
     #[inline(always)]
-    fn t_min(&self) -> f64 {
-        self.t_min
-    }
-    #[inline(always)]
-    fn t_max(&self) -> f64 {
-        self.t_max
-    }
-    #[inline(always)]
-    fn offer(&mut self, hit: Candidate) -> ControlFlow<(), bool> {
-        let inside = self.t_min <= hit.t && hit.t <= self.t_max;
-        self.count += u32::from(inside && self.source != Some(hit.id) && (self.accept)(&hit));
+    fn take(&mut self, _: Hit, _: &mut f64) -> ControlFlow<(), bool> {
+        self.0 += 1;
         ControlFlow::Continue(false)
     }
 }
@@ -55,10 +40,10 @@ impl Scene {
         source: Option<HitId>,
         accept: impl FnMut(&Hit) -> bool,
     ) -> u32 {
-        let mut count = Count { t_min: ray.t_min, t_max: ray.t_max, source: self.flat(source), accept, count: 0 };
+        let mut count = Collect::new(ray, self.flat(source), accept, Count(0));
         // It never breaks.
         let _ = self.collect(ray, crossings, &mut count);
-        count.count
+        count.take.0
     }
 
     /// [`Scene::count_hits`] for each ray, into the slot of the same index. The shorter slice decides how many.

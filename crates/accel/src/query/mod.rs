@@ -10,8 +10,10 @@ mod decision;
 
 use core::ops::ControlFlow;
 
+use firsthit_geometry::Ray;
 use glam::DVec3;
 
+pub(crate) use all_hits::All;
 pub use all_hits::HitLists;
 pub(crate) use any_hit::Any;
 pub(crate) use closest_hit::Closest;
@@ -42,8 +44,59 @@ pub(crate) trait Collector {
     /// when nothing more is wanted.
     fn offer(&mut self, hit: Candidate) -> ControlFlow<(), bool>;
     /// Whether finding near hits first helps.
-    fn ordered(&self) -> bool {
+    fn ordered(&self) -> bool;
+}
+
+/// What a query does with the hits that it wants.
+pub(crate) trait Take {
+    /// Whether finding near hits first helps.
+    const ORDERED: bool = true;
+    /// Whether a hit in the interval is of any use; only then is the filter asked.
+    #[inline(always)]
+    fn wants(&self, _: &Hit) -> bool {
         true
+    }
+    /// Takes it; the answer is that of [`Collector::offer`], and `t_max` may become smaller.
+    fn take(&mut self, hit: Hit, t_max: &mut f64) -> ControlFlow<(), bool>;
+}
+
+/// Passes on the accepted hits of a closed interval, other than on the primitive `source`.
+pub(crate) struct Collect<F, T> {
+    t_min: f64,
+    t_max: f64,
+    source: Option<HitId>,
+    accept: F,
+    pub(crate) take: T,
+}
+
+impl<F: FnMut(&Hit) -> bool, T: Take> Collect<F, T> {
+    #[inline(always)]
+    pub(crate) fn new(ray: &Ray<f64>, source: Option<HitId>, accept: F, take: T) -> Self {
+        Self { t_min: ray.t_min, t_max: ray.t_max, source, accept, take }
+    }
+}
+
+impl<F: FnMut(&Hit) -> bool, T: Take> Collector for Collect<F, T> {
+    #[inline(always)]
+    fn t_min(&self) -> f64 {
+        self.t_min
+    }
+    #[inline(always)]
+    fn t_max(&self) -> f64 {
+        self.t_max
+    }
+    #[inline(always)]
+    fn offer(&mut self, hit: Candidate) -> ControlFlow<(), bool> {
+        let inside = self.t_min <= hit.t && hit.t <= self.t_max;
+        if inside && self.take.wants(&hit) && self.source != Some(hit.id) && (self.accept)(&hit) {
+            self.take.take(hit, &mut self.t_max)
+        } else {
+            ControlFlow::Continue(false)
+        }
+    }
+    #[inline(always)]
+    fn ordered(&self) -> bool {
+        T::ORDERED
     }
 }
 

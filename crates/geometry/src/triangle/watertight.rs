@@ -60,7 +60,7 @@ impl<R: Real> Shear<R> {
     #[inline(always)]
     #[must_use]
     pub fn weights(&self, vertices: [R::Vec3; 3]) -> Option<Weights<R>> {
-        self.decide::<true>(vertices)
+        self.decide::<true>(vertices, exact)
     }
 
     /// The same by the rounded edge functions alone, without double precision where one is 0: what that guard is worth
@@ -70,11 +70,17 @@ impl<R: Real> Shear<R> {
     #[inline(always)]
     #[must_use]
     pub fn weights_unguarded(&self, vertices: [R::Vec3; 3]) -> Option<Weights<R>> {
-        self.decide::<false>(vertices)
+        self.decide::<false>(vertices, |_| None)
     }
 
+    /// By the rounded edge functions; where they do not tell, by `undecided`. Without `ZERO_TELLS_NOTHING` an edge
+    /// function that rounds to 0 counts as inside.
     #[inline(always)]
-    fn decide<const FALLBACK: bool>(&self, vertices: [R::Vec3; 3]) -> Option<Weights<R>> {
+    fn decide<const ZERO_TELLS_NOTHING: bool>(
+        &self,
+        vertices: [R::Vec3; 3],
+        undecided: impl FnOnce([(R, R); 3]) -> Option<Weights<R>>,
+    ) -> Option<Weights<R>> {
         // Written out: `map` on arrays is not always inlined, and cost a sixth of the time.
         let [a, b, c] = vertices;
         let ((ax, ay), (bx, by), (cx, cy)) = (self.apply(a), self.apply(b), self.apply(c));
@@ -87,13 +93,11 @@ impl<R: Real> Shear<R> {
             return None;
         }
         let inverse = R::ONE / (e0 + e1 + e2);
-        // A sum that is infinite or NaN (overflow), or too small for a reciprocal, is left to double precision too.
+        // A sum that is infinite or NaN (overflow), or too small for a reciprocal, tells nothing either.
         let usable = inverse.is_finite() && inverse != R::ZERO;
-        if FALLBACK && (e0 == R::ZERO || e1 == R::ZERO || e2 == R::ZERO || !usable) {
-            return exact([(ax, ay), (bx, by), (cx, cy)]);
-        }
-        if !FALLBACK && !usable {
-            return None;
+        let zero = e0 == R::ZERO || e1 == R::ZERO || e2 == R::ZERO;
+        if (ZERO_TELLS_NOTHING && zero) || !usable {
+            return undecided([(ax, ay), (bx, by), (cx, cy)]);
         }
         Some(Weights { u: (e1 * inverse).min(R::ONE), v: (e2 * inverse).min(R::ONE) })
     }
@@ -122,22 +126,7 @@ impl<R: Real> Shear<R> {
     #[inline(always)]
     #[must_use]
     pub fn crosses(&self, vertices: [R::Vec3; 3]) -> Option<Weights<R>> {
-        let [a, b, c] = vertices;
-        let ((ax, ay), (bx, by), (cx, cy)) = (self.apply(a), self.apply(b), self.apply(c));
-        let e0 = cx * by - cy * bx;
-        let e1 = ax * cy - ay * cx;
-        let e2 = bx * ay - by * ax;
-        let below = e0 < R::ZERO || e1 < R::ZERO || e2 < R::ZERO;
-        let above = e0 > R::ZERO || e1 > R::ZERO || e2 > R::ZERO;
-        if below && above {
-            return None;
-        }
-        let inverse = R::ONE / (e0 + e1 + e2);
-        let usable = inverse.is_finite() && inverse != R::ZERO;
-        if e0 == R::ZERO || e1 == R::ZERO || e2 == R::ZERO || !usable {
-            return exact_crossing([(ax, ay), (bx, by), (cx, cy)]);
-        }
-        Some(Weights { u: (e1 * inverse).min(R::ONE), v: (e2 * inverse).min(R::ONE) })
+        self.decide::<true>(vertices, exact_crossing)
     }
 
     /// How the line passes through a triangle that it meets or crosses, as seen by this test: `Less` against the normal
