@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::Vec3;
 
 pub use firsthit_measure::flat::{FlatHit, FlatScene};
-pub use firsthit_measure::mesh::{Mesh, grid_cube, icosphere, torus};
+pub use firsthit_measure::mesh::{Mesh, grid_cube, icosphere, soup, torus};
 pub use firsthit_measure::random::{Aim, Rng};
 
 /// Positions and fanned faces of an OBJ file, nothing else of it; `None` where it cannot be read.

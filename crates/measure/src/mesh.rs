@@ -4,6 +4,8 @@ use std::collections::HashMap;
 
 use glam::{DVec3, Vec3};
 
+use crate::random::Rng;
+
 /// An indexed mesh.
 #[derive(Clone, Debug, Default)]
 pub struct Mesh {
@@ -129,4 +131,16 @@ pub fn bumpy_sphere(levels: u32) -> Mesh {
         let bulge = (4.0 * (p.y - 1.0)).exp();
         p * (1.0 + 0.15 * hills + 0.5 * bulge)
     })
+}
+
+/// Triangles of sizes up to about 1 strewn through the cube `[-1, 1]^3`: open, and through one another.
+#[must_use]
+pub fn soup(rng: &mut Rng, count: u32) -> Mesh {
+    let mut mesh = Mesh::default();
+    for k in 0..count {
+        let (center, size) = (rng.in_cube(), 0.05 + 0.5 * rng.unit());
+        mesh.positions.extend((0..3).map(|_| (center + rng.in_cube() * size).as_vec3()));
+        mesh.triangles.push([3 * k, 3 * k + 1, 3 * k + 2]);
+    }
+    mesh
 }

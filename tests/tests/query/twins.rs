@@ -3,21 +3,11 @@
 use firsthit_accel::Geometry;
 use firsthit_accel::{BuildError, SceneBuilder, reference};
 use firsthit_geometry::{Precision, Ray, Shape, shapes::Sphere};
-use firsthit_tests::oracle::{FlatScene, Mesh, Rng, icosphere};
+use firsthit_tests::oracle::{FlatScene, Mesh, Rng, icosphere, soup};
 use glam::{DAffine3, DMat3, DVec3};
 use proptest::prelude::*;
 
 use crate::{options, triangles};
-
-fn soup(rng: &mut Rng, count: usize) -> Mesh {
-    let mut mesh = Mesh::default();
-    for k in 0..count as u32 {
-        let (center, size) = (rng.in_cube(), 0.05 + 0.5 * rng.unit());
-        mesh.positions.extend((0..3).map(|_| (center + rng.in_cube() * size).as_vec3()));
-        mesh.triangles.push([3 * k, 3 * k + 1, 3 * k + 2]);
-    }
-    mesh
-}
 
 /// Rotation, non-uniform and negative scale, shear, anywhere; condition number at most about 1000.
 fn affine(rng: &mut Rng) -> DAffine3 {

@@ -6,18 +6,8 @@ use glam::{DAffine3, DMat3, DVec3};
 
 use super::{Check, triangles};
 use crate::flat::{FlatHit, FlatScene};
-use crate::mesh::{Mesh, icosphere};
+use crate::mesh::{Mesh, icosphere, soup};
 use crate::random::Rng;
-
-fn soup(rng: &mut Rng, count: u32) -> Mesh {
-    let mut mesh = Mesh::default();
-    for k in 0..count {
-        let (center, size) = (rng.in_cube(), 0.05 + 0.5 * rng.unit());
-        mesh.positions.extend((0..3).map(|_| (center + rng.in_cube() * size).as_vec3()));
-        mesh.triangles.push([3 * k, 3 * k + 1, 3 * k + 2]);
-    }
-    mesh
-}
 
 /// Two rotations about an uneven, perhaps mirroring stretch (together also a shear), anywhere; condition at most 1e3.
 fn affine(rng: &mut Rng) -> DAffine3 {
