@@ -1,6 +1,19 @@
 //! Benches of firsthit, and the peers that it is measured against on the same rays.
 //!
 //! * `cargo bench -p firsthit-benches`: criterion benches of traversal (`benches/benches/`).
+//! * `cargo run --release -p firsthit-benches --bin peers`: speed, memory, build time and wrong answers, firsthit beside
+//!   its peers.
 //! * `cargo run --release -p firsthit-benches --bin leaks`: rays lost through closed meshes, firsthit beside its peers.
 
+pub mod engine;
+pub mod generated;
+pub mod judge;
+pub mod memory;
+pub mod model;
 pub mod peer;
+pub mod race;
+pub mod random;
+pub mod rays;
+pub mod record;
+pub mod reference;
+pub mod summary;

@@ -108,7 +108,7 @@ fn aimed(mesh: &Mesh, (centre, half): (DVec3, f64), aim: Aim, count: usize, seed
             let origin = (centre + rng.in_cube() * half).as_vec3();
             let target = aim.point(mesh.corners(rng.below(mesh.triangles.len())), &mut rng).as_vec3();
             let direction = target - origin;
-            Ray32 { origin, direction: if k % 2 == 1 { direction.normalize() } else { direction } }
+            Ray32::new(origin, if k % 2 == 1 { direction.normalize() } else { direction })
         })
         .collect()
 }
