@@ -450,3 +450,15 @@ fn scaled(shape: &Shape<f64>, s: f64) -> Shape<f64> {
         other => other.clone(),
     }
 }
+
+/// Found by random bytes: a point less than the largest number times smaller than the radius from the centre.
+#[test]
+fn a_sphere_refines_any_point() {
+    let sphere = Sphere::new(Vec3::new(0.0, 5.421011e-20, 0.0), 7.5617144e28_f32).unwrap();
+    for point in [Vec3::ZERO, sphere.center(), Vec3::new(1e-40, -1e-30, 0.0), Vec3::splat(1e30)] {
+        let (on, error) = sphere.refine(point, None);
+        assert!(on.is_finite() && error >= 0.0, "{point} {on} {error}");
+        let radius = (on - sphere.center()).as_dvec3().length();
+        assert!((radius - f64::from(sphere.radius())).abs() <= f64::from(error), "{point} {on} {error}");
+    }
+}

@@ -205,6 +205,13 @@ fn nearest(x: f64, below: f64, above: f64, end: i32, even: bool, cmp: impl Fn(&E
     (low.is_gt() || even && low.is_eq()) && (high.is_lt() || even && high.is_eq())
 }
 
+/// What is at least this far from 0 rounds to infinity: half a unit beyond the largest float.
+#[must_use]
+pub fn end(double: bool) -> Exact {
+    let (exponent, digits) = if double { (1024, 53) } else { (128, 24) };
+    &Exact::power_of_two(exponent) - &Exact::power_of_two(exponent - digits - 1)
+}
+
 /// What exact numbers say of a ray's line and a triangle.
 #[derive(Clone, Debug)]
 pub struct Crossed {
@@ -318,6 +325,8 @@ mod tests {
         assert!(is_nearest_f32(0.1, |y| Exact::new(0.1).cmp(y)));
         let far = Exact::power_of_two(1024);
         assert!(!is_nearest(f64::MAX, |y| far.cmp(y)) && !is_nearest(f64::INFINITY, |y| far.cmp(y)));
+        let (end, little) = (end(true), Exact::power_of_two(900));
+        assert!(!is_nearest(f64::MAX, |y| end.cmp(y)) && is_nearest(f64::MAX, |y| (&end - &little).cmp(y)));
     }
 
     #[test]

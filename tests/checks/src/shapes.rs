@@ -117,16 +117,18 @@ fn check<R: Real>(shape: &Shape<R>, ray: &Ray<R>) {
     assert!((0..3).all(|i| !bounds.min.axis(i).is_nan() && !bounds.max.axis(i).is_nan()), "{bounds:?} {}", say());
 
     if let Some(equation) = equation(shape, ray).filter(|_| ray.is_valid()) {
+        let double = R::UNIT_ROUNDOFF.to_f64() < 1e-10;
+        let end = exact::end(double);
         let inside = |r: &Root<'_>| {
             r.cmp_float(ray.t_min.to_f64()).is_ge()
                 && r.cmp_float(ray.t_max.to_f64()).is_le()
-                && r.cmp_float(R::MAX.to_f64()).is_le()
-                && r.cmp_float(-R::MAX.to_f64()).is_ge()
+                && r.compare(&end).is_lt()
+                && r.compare(&-&end).is_gt()
         };
         let roots: Vec<Root<'_>> = Root::of(&equation).into_iter().filter(inside).collect();
         assert_eq!(roots.len(), hits.len(), "{hits:?} {}", say());
         for (root, h) in roots.iter().zip(&hits) {
-            let near = if R::UNIT_ROUNDOFF.to_f64() < 1e-10 {
+            let near = if double {
                 exact::is_nearest(h.hit.t.to_f64(), |x| root.compare(x))
             } else {
                 exact::is_nearest_f32(h.hit.t.to_f32(), |x| root.compare(x))
@@ -167,8 +169,8 @@ fn thin(shape: &Shape<f64>) -> bool {
     let narrow = |b: Aabb<f64>, most: usize| b.extent().to_array().iter().filter(|e| **e < 1e-3).count() > most;
     match shape {
         Shape::Disk(d) => d.radius() - d.inner_radius() < 1e-3,
-        Shape::Quadric(q) => narrow(q.clip(), 0),
-        Shape::Solid(s) => narrow(s.surface().clip(), 0),
+        Shape::Quadric(q) => narrow(q.clip(), 0) || narrow(q.bounds(), 1),
+        Shape::Solid(s) => narrow(s.surface().clip(), 0) || narrow(s.bounds(), 1),
         other => narrow(other.bounds(), 1),
     }
 }
@@ -181,27 +183,63 @@ fn agree(shape: &Shape<f64>, ray: &Ray<f64>) {
         return;
     }
     let Some(first) = clear(shape, ray) else { return };
-    for axis in DVec3::AXES.into_iter().flat_map(|a| [a, -a]) {
-        let moved = Ray { origin: ray.origin + axis * LITTLE, ..*ray };
-        let turned = Ray { direction: ray.direction + axis * LITTLE, ..*ray };
-        for step in [moved, turned] {
-            let same = match (first, clear(shape, &step)) {
-                (None, Some(None)) => true,
-                (Some(a), Some(Some(b))) => (a - b).abs() < 1e-3 * (1.0 + a.abs()),
-                _ => false,
-            };
-            if !same {
-                return;
-            }
+    let same = |ray: Ray<f64>| match (first, clear(shape, &ray)) {
+        (None, Some(None)) => true,
+        (Some(a), Some(Some(b))) => (a - b).abs() < 1e-3 * (1.0 + a.abs()),
+        _ => false,
+    };
+    // An end of the interval, too, may be where the surface is.
+    let longer = ray.with_interval(ray.t_min - LITTLE, ray.t_max + LITTLE);
+    let shorter = ray.with_interval(ray.t_min + LITTLE, ray.t_max - LITTLE);
+    if !same(shorter) {
+        return;
+    }
+    for step in neighbours() {
+        let moved = Ray { origin: ray.origin + step * LITTLE, ..longer };
+        let turned = Ray { direction: ray.direction + step * LITTLE, ..longer };
+        if !same(moved) || !same(turned) {
+            return;
         }
     }
     let stable = shape.closest_hit(ray).map(|h| h.t);
+    if [first, stable].into_iter().flatten().any(|t| at_rim(shape, ray.at(t))) {
+        return;
+    }
     let same = match (first, stable) {
         (None, None) => true,
         (Some(a), Some(b)) => (a - b).abs() < 1e-6 * (1.0 + a.abs()),
         _ => false,
     };
     assert!(same, "exactly {first:?}, stable {stable:?}: {shape:?} {ray:?}");
+}
+
+/// Whether a point of the shape is at an end of its surface that no ray nearby may tell: where a face of the clip box
+/// cuts a quadric, or touches it at a vertex; on an edge of a polygon, of which two may enclose nothing.
+fn at_rim(shape: &Shape<f64>, point: DVec3) -> bool {
+    let to_surface = |q: &Quadric<f64>| (q.refine(point, None).0 - point).length();
+    let to_clip = |b: Aabb<f64>| (point - b.min).abs().min((point - b.max).abs()).min_element();
+    let away = match shape {
+        Shape::Quadric(q) => to_clip(q.clip()),
+        Shape::Solid(s) => to_clip(s.surface().clip()).max(to_surface(s.surface())),
+        Shape::Polygon(p) => {
+            let edges = p.loops().iter().flat_map(|l| l.iter().zip(l.iter().cycle().skip(1)));
+            edges.map(|(a, b)| to_segment(point, *a, *b)).fold(f64::INFINITY, f64::min)
+        }
+        _ => f64::INFINITY,
+    };
+    away < 1e-6
+}
+
+/// The distance of a point from a line segment.
+fn to_segment(point: DVec3, a: DVec3, b: DVec3) -> f64 {
+    let along = ((point - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
+    let nearest = if along.is_nan() { a } else { a + (b - a) * along };
+    (point - nearest).length()
+}
+
+/// Nowhere, and to the 26 neighbours in a grid: along axes alone, a ray from a corner of a clip box stays in its faces.
+fn neighbours() -> impl Iterator<Item = DVec3> {
+    (0..27).map(|i| DVec3::new(f64::from(i % 3), f64::from(i / 3 % 3), f64::from(i / 9)) - 1.0)
 }
 
 /// The first exact hit, if any; nothing where the ray only touches, or meets two sides at nearly the same place.

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::common::{cast, finite, longitude, padded, positive, unit};
+use super::common::{balanced, cast, finite, longitude, padded, positive, unit};
 use super::exact::visit_roots;
 use super::{ExactVisitor, Primitive, ShapeError, SurfaceHit};
 use crate::exact::number::{Number, differences, dot, vector};
@@ -149,11 +149,15 @@ impl<R: Real> Primitive<R> for Sphere<R> {
         self.nearest(ray).is_some()
     }
 
-    /// Projects along the radius; leaves `gamma(5) r` and the rounding of the coordinates themselves.
+    /// Projects along the radius; leaves `gamma(5) r` and the rounding of the coordinates themselves. The centre, where
+    /// every direction is as good, stays.
     fn refine(&self, point: R::Vec3, _: Option<R::Vec3>) -> (R::Vec3, R) {
-        let l = point - self.center;
+        let l = balanced::<R>(point - self.center);
         let length = l.length();
-        let p = if length > R::ZERO { self.center + l * (self.radius / length) } else { point };
+        if !(length > R::ZERO) {
+            return (point, self.radius);
+        }
+        let p = self.center + l * (self.radius / length);
         (p, R::gamma(12) * self.radius + R::gamma(2) * p.abs().max_element())
     }
 }
