@@ -60,6 +60,38 @@ impl Guards {
     }
 }
 
+/// Guards as a type: known when compiling, or not.
+pub(crate) trait GuardSet: Copy {
+    fn new(guards: Guards) -> Self;
+    fn has(self, guard: Guards) -> bool;
+}
+
+/// All of them.
+#[derive(Clone, Copy)]
+pub(crate) struct AllGuards;
+
+impl GuardSet for AllGuards {
+    #[inline(always)]
+    fn new(_: Guards) -> Self {
+        Self
+    }
+    #[inline(always)]
+    fn has(self, _: Guards) -> bool {
+        true
+    }
+}
+
+impl GuardSet for Guards {
+    #[inline(always)]
+    fn new(guards: Guards) -> Self {
+        guards
+    }
+    #[inline(always)]
+    fn has(self, guard: Guards) -> bool {
+        self.contains(guard)
+    }
+}
+
 impl Default for Guards {
     fn default() -> Self {
         Self::ALL

@@ -1,12 +1,16 @@
 //! Triangle tests by tier, in an object's normalised space.
 
+use core::marker::PhantomData;
+
 use firsthit_geometry::{
     Ray,
-    exact::ExactRay,
-    triangle::{self, Shear},
+    exact::{ExactHit, ExactRay},
+    triangle::{self, Shear, Weights},
 };
 use glam::{DVec3, Vec3};
 
+use crate::Guards;
+use crate::guards::{AllGuards, GuardSet};
 use crate::local::LocalRay;
 use crate::simd::Lanes;
 use crate::wide::{Either, Filter, Margin, Plain, Sheared};
@@ -29,28 +33,79 @@ pub(crate) struct Found {
     pub(crate) t: f64,
     pub(crate) u: f32,
     pub(crate) v: f32,
+    /// By winding, of any length.
+    pub(crate) normal: DVec3,
+    /// The hit may lie outside the triangle's box as the boxes' test sees it: see [`LocalRay::within_box`].
+    pub(crate) grazing: bool,
     /// `f64` could not decide.
     pub(crate) fallback: bool,
 }
 
-impl Found {
+/// Where the ray meets the plane of a triangle.
+struct Plane {
+    t: f64,
+    normal: DVec3,
+    grazing: bool,
+}
+
+impl Plane {
     #[inline(always)]
-    fn new(t: f64, u: f32, v: f32) -> Self {
-        Self { t, u, v, fallback: false }
+    fn at(self, u: f32, v: f32) -> Found {
+        Found { t: self.t, u, v, normal: self.normal, grazing: self.grazing, fallback: false }
     }
+}
+
+/// The ray meets a plane more steeply if the cosine between it and the normal is larger than 1/4. Then a point of the
+/// plane on the ray is no farther than `1 + sqrt(3) * 4`, less than 8, times [`LocalRay::reach`] from the triangle that
+/// the test has accepted, and [`LocalRay::delta`] covers that.
+const STEEP: f64 = 1.0 / 16.0;
+
+/// Sines (squared) between edges below this lose too many digits of a plain cross product.
+const SLIVER: f64 = 1.0 / (1u64 << 40) as f64;
+
+/// [`triangle::plane_parameter`] and [`triangle::area_vector`] by the shortest way where that is as good for a `t` of
+/// 29 digits, as nearly always.
+#[inline(always)]
+fn plane(vertices: &[Vec3; 3], ray: &LocalRay) -> Option<Plane> {
+    let [a, b, c] = double(vertices);
+    let (e1, e2, r) = (b - a, c - a, a - ray.origin);
+    let normal = e1.cross(e2);
+    let along = normal.dot(ray.direction);
+    let t = normal.dot(r) / along;
+    let (nn, dd) = (normal.length_squared(), ray.length_squared);
+    let plain = nn > SLIVER * (e1.length_squared() * e2.length_squared())
+        && along * along > STEEP * (nn * dd)
+        && t.abs() > ray.near;
+    if plain { Some(Plane { t, normal, grazing: false }) } else { careful_plane(vertices, ray) }
+}
+
+/// The same with all digits.
+#[inline(never)]
+fn careful_plane(vertices: &[Vec3; 3], ray: &LocalRay) -> Option<Plane> {
+    let vertices = double(vertices);
+    let t = triangle::plane_parameter(vertices, ray.origin, ray.direction)?;
+    Some(Plane { t, normal: triangle::area_vector(vertices), grazing: true })
 }
 
 /// How a tier meets boxes and triangles.
 pub(crate) trait Kernel {
-    /// Boxes are met as if larger by all that is rounded, so that none with a hit is missed.
-    const PADDED: bool;
-    /// Hits are kept within their primitive's box: see [`LocalRay::within_box`].
-    const CLAMPED: bool;
+    /// Boxes of instances are met as if larger by all that is rounded.
+    const PADDED_ABOVE: bool = true;
     /// What is prepared once per ray and instance.
     type Setup;
     /// Picks from eight triangles those that are worth a test.
     type Filter<L: Lanes>: Filter<L>;
-    fn setup(ray: &LocalRay) -> Self::Setup;
+    fn setup(ray: &LocalRay, guards: Guards) -> Self::Setup;
+    /// Boxes are met as if larger by all that is rounded, so that none with a hit is missed.
+    #[inline(always)]
+    fn padded(_: &Self::Setup) -> bool {
+        true
+    }
+    /// Hits are kept within their primitive's box: see [`LocalRay::within_box`].
+    #[inline(always)]
+    fn clamped(_: &Self::Setup) -> bool {
+        true
+    }
     fn filter<L: Lanes>(setup: &Self::Setup, ray: &LocalRay) -> Self::Filter<L>;
     /// The hit, if there is one; beyond `t_max` it is not wanted, but may be given.
     fn test(setup: &Self::Setup, ray: &LocalRay, vertices: &[Vec3; 3], t_max: f64) -> Option<Found>;
@@ -59,19 +114,39 @@ pub(crate) trait Kernel {
     fn crosses(setup: &Self::Setup, ray: &LocalRay, vertices: &[Vec3; 3], t_max: f64) -> Option<Found> {
         Self::test(setup, ray, vertices, t_max)
     }
+    /// [`Kernel::test`] of a triangle that passed the filter, with what that knows of it.
+    #[inline(always)]
+    fn test_known(
+        setup: &Self::Setup,
+        ray: &LocalRay,
+        vertices: &[Vec3; 3],
+        _known: [f32; 3],
+        t_max: f64,
+    ) -> Option<Found> {
+        Self::test(setup, ray, vertices, t_max)
+    }
 }
 
 /// Tier `Fast`: Moeller-Trumbore in `f32`.
 pub(crate) struct Fast;
 
 impl Kernel for Fast {
-    const PADDED: bool = false;
-    const CLAMPED: bool = false;
+    const PADDED_ABOVE: bool = false;
     type Setup = ();
     type Filter<L: Lanes> = Plain<L>;
 
     #[inline(always)]
-    fn setup(_: &LocalRay) {}
+    fn setup(_: &LocalRay, _: Guards) {}
+
+    #[inline(always)]
+    fn padded((): &()) -> bool {
+        false
+    }
+
+    #[inline(always)]
+    fn clamped((): &()) -> bool {
+        false
+    }
 
     #[inline(always)]
     fn filter<L: Lanes>((): &(), ray: &LocalRay) -> Plain<L> {
@@ -81,78 +156,120 @@ impl Kernel for Fast {
     #[inline(always)]
     fn test((): &(), ray: &LocalRay, vertices: &[Vec3; 3], _: f64) -> Option<Found> {
         let hit = triangle::moeller_trumbore::<f32>(*vertices, ray.origin32, ray.direction32)?;
-        Some(Found::new(f64::from(hit.t) + ray.shift, hit.u, hit.v))
+        Some(Self::found([hit.t, hit.u, hit.v], ray, vertices))
+    }
+
+    #[inline(always)]
+    fn test_known((): &(), ray: &LocalRay, vertices: &[Vec3; 3], known: [f32; 3], _: f64) -> Option<Found> {
+        Some(Self::found(known, ray, vertices))
+    }
+}
+
+impl Fast {
+    #[inline(always)]
+    fn found([t, u, v]: [f32; 3], ray: &LocalRay, vertices: &[Vec3; 3]) -> Found {
+        let [a, b, c] = double(vertices);
+        let normal = (b - a).cross(c - a);
+        Found { t: f64::from(t) + ray.shift, u, v, normal, grazing: true, fallback: false }
     }
 }
 
 /// Tier `Robust` with its guards, see [`crate::Guards`]: all on, it is the watertight test in `f32`, and `t` from the
 /// plane and the unrounded ray in `f64`.
-pub(crate) struct Robust<const PADDING: bool, const WATERTIGHT: bool, const FALLBACK: bool, const PLANE_T: bool>;
+pub(crate) struct RobustBy<G>(PhantomData<G>);
 
-impl<const PADDING: bool, const WATERTIGHT: bool, const FALLBACK: bool, const PLANE_T: bool> Kernel
-    for Robust<PADDING, WATERTIGHT, FALLBACK, PLANE_T>
-{
-    const PADDED: bool = PADDING;
-    const CLAMPED: bool = PADDING;
-    type Setup = Shear<f32>;
-    type Filter<L: Lanes> = Either<L, WATERTIGHT>;
+/// With all guards.
+pub(crate) type Robust = RobustBy<AllGuards>;
+
+/// With some, as is known at run time only.
+pub(crate) type Guarded = RobustBy<Guards>;
+
+impl<G: GuardSet> Kernel for RobustBy<G> {
+    type Setup = (Shear<f32>, G);
+    type Filter<L: Lanes> = Either<L, G>;
 
     #[inline(always)]
-    fn setup(ray: &LocalRay) -> Shear<f32> {
-        Shear::new(ray.direction32)
+    fn setup(ray: &LocalRay, guards: Guards) -> Self::Setup {
+        (Shear::new(ray.direction32), G::new(guards))
     }
 
     #[inline(always)]
-    fn filter<L: Lanes>(shear: &Shear<f32>, ray: &LocalRay) -> Either<L, WATERTIGHT> {
+    fn padded((_, guards): &Self::Setup) -> bool {
+        guards.has(Guards::PADDING)
+    }
+
+    #[inline(always)]
+    fn clamped((_, guards): &Self::Setup) -> bool {
+        guards.has(Guards::PADDING)
+    }
+
+    #[inline(always)]
+    fn filter<L: Lanes>((shear, guards): &Self::Setup, ray: &LocalRay) -> Either<L, G> {
         Either {
+            guards: *guards,
             plain: Plain::new(ray.origin32, ray.direction32),
             sheared: Sheared::new(ray.origin32, ray.direction32, shear, 0.0, slack(ray)),
         }
     }
 
     #[inline(always)]
-    fn test(shear: &Shear<f32>, ray: &LocalRay, vertices: &[Vec3; 3], t_max: f64) -> Option<Found> {
-        if !WATERTIGHT {
+    fn test((shear, guards): &Self::Setup, ray: &LocalRay, vertices: &[Vec3; 3], t_max: f64) -> Option<Found> {
+        if !guards.has(Guards::WATERTIGHT) {
             let hit = Fast::test(&(), ray, vertices, t_max)?;
-            return Some(if PLANE_T { Found { t: plane(vertices, ray)?, ..hit } } else { hit });
+            return if guards.has(Guards::PLANE_T) { Some(plane(vertices, ray)?.at(hit.u, hit.v)) } else { Some(hit) };
         }
         let relative = relative(vertices, ray.origin32);
-        let w = if FALLBACK { shear.weights(relative) } else { shear.weights_unguarded(relative) }?;
-        let t = if PLANE_T {
-            plane(vertices, ray)?
-        } else {
+        let w = if guards.has(Guards::FALLBACK) { shear.weights(relative) } else { shear.weights_unguarded(relative) }?;
+        if guards.has(Guards::PLANE_T) {
+            return Some(plane(vertices, ray)?.at(w.u, w.v));
+        }
+        let t = {
             // The depth of the weighted point along the axis that the ray follows most.
             let axis = shear.axis();
             let [a, b, c] = relative.map(|p| p[axis]);
             let t = ((1.0 - w.u - w.v) * a + w.u * b + w.v * c) / ray.direction32[axis];
             f64::from(t) + ray.shift
         };
-        Some(Found::new(t, w.u, w.v))
+        let normal = triangle::area_vector(double(vertices));
+        Some(Found { t, u: w.u, v: w.v, normal, grazing: true, fallback: false })
     }
 
     #[inline(always)]
-    fn crosses(shear: &Shear<f32>, ray: &LocalRay, vertices: &[Vec3; 3], t_max: f64) -> Option<Found> {
-        if !WATERTIGHT {
-            return Self::test(shear, ray, vertices, t_max);
+    fn test_known(
+        setup: &Self::Setup,
+        ray: &LocalRay,
+        vertices: &[Vec3; 3],
+        known: [f32; 3],
+        t_max: f64,
+    ) -> Option<Found> {
+        // Where there is no fallback, that of this test must not be used.
+        if setup.1.has(Guards::WATERTIGHT | Guards::FALLBACK | Guards::PLANE_T)
+            && let Some(w) = Weights::told::<true>(known)
+        {
+            return Some(plane(vertices, ray)?.at(w.u, w.v));
         }
-        let w = shear.crosses(relative(vertices, ray.origin32))?;
-        Some(Found::new(crossing(vertices, ray, f64::from(w.u), f64::from(w.v)), w.u, w.v))
+        Self::test(setup, ray, vertices, t_max)
     }
-}
 
-#[inline(always)]
-fn plane(vertices: &[Vec3; 3], ray: &LocalRay) -> Option<f64> {
-    triangle::plane_parameter(double(vertices), ray.origin, ray.direction)
+    #[inline(always)]
+    fn crosses(setup: &Self::Setup, ray: &LocalRay, vertices: &[Vec3; 3], t_max: f64) -> Option<Found> {
+        if !setup.1.has(Guards::WATERTIGHT) {
+            return Self::test(setup, ray, vertices, t_max);
+        }
+        let w = setup.0.crosses(relative(vertices, ray.origin32))?;
+        Some(crossing(plane(vertices, ray), vertices, ray, f64::from(w.u), f64::from(w.v)).at(w.u, w.v))
+    }
 }
 
 /// Where the ray crosses a triangle with these weights. No crossing may be lost, so where the plane does not tell (the
 /// ray lies in it, but for rounding) the depth of the vertices does.
-#[inline(never)]
-fn crossing(vertices: &[Vec3; 3], ray: &LocalRay, u: f64, v: f64) -> f64 {
-    plane(vertices, ray).unwrap_or_else(|| {
+#[inline(always)]
+fn crossing(plane: Option<Plane>, vertices: &[Vec3; 3], ray: &LocalRay, u: f64, v: f64) -> Plane {
+    plane.unwrap_or_else(|| {
         let [a, b, c] = double(vertices);
         let point = a * (1.0 - u - v) + b * u + c * v;
-        (point - ray.origin).dot(ray.direction) / ray.direction.dot(ray.direction)
+        let t = (point - ray.origin).dot(ray.direction) / ray.direction.dot(ray.direction);
+        Plane { t, normal: triangle::area_vector([a, b, c]), grazing: true }
     })
 }
 
@@ -160,7 +277,7 @@ fn crossing(vertices: &[Vec3; 3], ray: &LocalRay, u: f64, v: f64) -> f64 {
 #[inline(always)]
 fn margin<L: Lanes>(ray: &LocalRay) -> Margin<L> {
     // A sheared coordinate takes in the errors of two axes; the rest is for the rounding of this line.
-    let off = (ray.reach().max_element() * 2.1) as f32;
+    let off = (ray.most_reach() * 2.1) as f32;
     Margin(Sheared::new(ray.origin32, ray.direction32, &Shear::new(ray.direction32), off, slack(ray)))
 }
 
@@ -168,20 +285,18 @@ fn margin<L: Lanes>(ray: &LocalRay) -> Margin<L> {
 /// with rounded vertices.
 #[inline(always)]
 fn slack(ray: &LocalRay) -> f32 {
-    2.0 * ray.delta().max_element()
+    2.0 * ray.delta
 }
 
 /// Tier `Double`: the same in `f64`, with the unrounded ray.
 pub(crate) struct Double;
 
 impl Kernel for Double {
-    const PADDED: bool = true;
-    const CLAMPED: bool = true;
     type Setup = Shear<f64>;
     type Filter<L: Lanes> = Margin<L>;
 
     #[inline(always)]
-    fn setup(ray: &LocalRay) -> Shear<f64> {
+    fn setup(ray: &LocalRay, _: Guards) -> Shear<f64> {
         Shear::new(ray.direction)
     }
 
@@ -194,14 +309,15 @@ impl Kernel for Double {
     fn test(setup: &Shear<f64>, ray: &LocalRay, vertices: &[Vec3; 3], _: f64) -> Option<Found> {
         let [a, b, c] = double(vertices);
         let w = setup.weights([a - ray.origin, b - ray.origin, c - ray.origin])?;
-        Some(Found::new(plane(vertices, ray)?, w.u as f32, w.v as f32))
+        Some(careful_plane(vertices, ray)?.at(w.u as f32, w.v as f32))
     }
 
     #[inline(always)]
     fn crosses(setup: &Shear<f64>, ray: &LocalRay, vertices: &[Vec3; 3], _: f64) -> Option<Found> {
         let [a, b, c] = double(vertices);
         let w = setup.crosses([a - ray.origin, b - ray.origin, c - ray.origin])?;
-        Some(Found::new(crossing(vertices, ray, w.u, w.v), w.u as f32, w.v as f32))
+        let plane = crossing(careful_plane(vertices, ray), vertices, ray, w.u, w.v);
+        Some(plane.at(w.u as f32, w.v as f32))
     }
 }
 
@@ -214,10 +330,13 @@ impl Kernel for Double {
 pub(crate) struct Exact;
 
 impl Kernel for Exact {
-    const PADDED: bool = true;
-    const CLAMPED: bool = false;
     type Setup = Option<ExactRay>;
     type Filter<L: Lanes> = Margin<L>;
+
+    #[inline(always)]
+    fn clamped(_: &Option<ExactRay>) -> bool {
+        false
+    }
 
     #[inline(always)]
     fn filter<L: Lanes>(_: &Option<ExactRay>, ray: &LocalRay) -> Margin<L> {
@@ -225,8 +344,8 @@ impl Kernel for Exact {
     }
 
     #[inline(always)]
-    fn setup(ray: &LocalRay) -> Option<ExactRay> {
-        let [t_min, t_max] = ray.interval;
+    fn setup(ray: &LocalRay, _: Guards) -> Option<ExactRay> {
+        let [t_min, t_max] = ray.interval();
         let exact = ExactRay::new(Ray { origin: ray.origin, direction: ray.direction, t_min, t_max })?;
         Some(if ray.shift == 0.0 { exact } else { exact.near(ray.shift) })
     }
@@ -234,12 +353,20 @@ impl Kernel for Exact {
     #[inline(always)]
     fn test(setup: &Option<ExactRay>, _: &LocalRay, vertices: &[Vec3; 3], t_max: f64) -> Option<Found> {
         let hit = setup.as_ref()?.hit_before(double(vertices), t_max)?;
-        Some(Found { t: hit.t, u: hit.u as f32, v: hit.v as f32, fallback: hit.fallback })
+        Some(Self::found(&hit, vertices))
     }
 
     #[inline(always)]
     fn crosses(setup: &Option<ExactRay>, _: &LocalRay, vertices: &[Vec3; 3], t_max: f64) -> Option<Found> {
         let hit = setup.as_ref()?.hit_before(double(vertices), t_max).filter(|h| h.crosses)?;
-        Some(Found { t: hit.t, u: hit.u as f32, v: hit.v as f32, fallback: hit.fallback })
+        Some(Self::found(&hit, vertices))
+    }
+}
+
+impl Exact {
+    #[inline(always)]
+    fn found(hit: &ExactHit, vertices: &[Vec3; 3]) -> Found {
+        let normal = triangle::area_vector(double(vertices));
+        Found { t: hit.t, u: hit.u as f32, v: hit.v as f32, normal, grazing: true, fallback: hit.fallback }
     }
 }

@@ -33,15 +33,26 @@ const U: f64 = f32::UNIT_ROUNDOFF as f64;
 const FAR: f64 = 8.0;
 
 /// Half the difference between an object's box and the box that is put into the tree over instances, in each axis: more
-/// than any [`LocalRay::reach`].
+/// than eight times any [`LocalRay::reach`].
 pub(crate) fn instance_padding(bounds: &Aabb<f64>) -> DVec3 {
-    // R <= (FAR + 1) half sizes; |o| <= |center| + FAR half sizes; 10 uR + 5u|o| <= 130 u half + 5u|center|.
-    DVec3::splat(half_size(bounds) * 144.0 * U) + bounds.center().abs() * (6.0 * U) + TINY
+    // R <= (FAR + 1) half sizes; |o| <= |center| + FAR half sizes; 8 (8 uR + u|o|) <= 640 u half + 8u|center|.
+    DVec3::splat(half_size(bounds) * 720.0 * U) + bounds.center().abs() * (10.0 * U) + TINY
 }
 
 /// In units of a normalised object, of size near 1: covers directions so small that their rounding to `f32` is not
 /// relative.
 const TINY: f64 = 1.0 / (1u64 << 40) as f64;
+
+/// The largest component by magnitude; where one is NaN, some.
+#[inline(always)]
+fn largest(v: DVec3) -> f64 {
+    let [x, y, z] = v.abs().to_array();
+    let xy = if x > y { x } else { y };
+    if xy > z { xy } else { z }
+}
+
+/// The bits of an `f64`'s exponent.
+const EXPONENT: u64 = 0x7ff << 52;
 
 fn half_size(bounds: &Aabb<f64>) -> f64 {
     bounds.extent().max_element() * 0.5
@@ -51,6 +62,8 @@ fn half_size(bounds: &Aabb<f64>) -> f64 {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Extent {
     center: DVec3,
+    /// Largest coordinate of the centre.
+    magnitude: f64,
     /// Half the longest side of the box.
     half: f64,
 }
@@ -58,7 +71,11 @@ pub(crate) struct Extent {
 impl Extent {
     /// A point at the origin for an object without a box.
     pub(crate) fn new(bounds: &Aabb<f64>) -> Self {
-        if bounds.is_empty() { Self::default() } else { Self { center: bounds.center(), half: half_size(bounds) } }
+        if bounds.is_empty() {
+            return Self::default();
+        }
+        let center = bounds.center();
+        Self { center, magnitude: largest(center), half: half_size(bounds) }
     }
 }
 
@@ -71,15 +88,25 @@ pub(crate) struct LocalRay {
     pub(crate) direction: DVec3,
     /// A power of two.
     pub(crate) t_scale: f64,
+    /// Its reciprocal.
+    pub(crate) t_unscale: f64,
     /// The moved origin is `origin + shift * direction`, and its parameter counts from there.
     pub(crate) shift: f64,
-    /// The ray's interval in this space's parameter.
-    pub(crate) interval: [f64; 2],
-    moved: DVec3,
+    /// The world ray's interval.
+    world: [f64; 2],
     /// How far moving may have rounded the origin off the line, in each axis.
     off: f64,
     /// Largest coordinate difference between the moved origin and the object.
     farthest: f64,
+    /// Not below [`LocalRay::reach`] in any axis.
+    most: f64,
+    /// By how much, in each axis, boxes are met as if larger: more than eight times [`LocalRay::reach`], since so far
+    /// from its triangle a hit may lie (that of a ray which does not graze the plane).
+    pub(crate) delta: f32,
+    /// A hit that is nearer to the true origin loses too many digits of its distance to some vertex, by 2^20 times.
+    pub(crate) near: f64,
+    /// Of the direction.
+    pub(crate) length_squared: f64,
     /// The moved origin in single precision.
     pub(crate) origin32: Vec3,
     /// The direction in single precision.
@@ -91,52 +118,89 @@ impl LocalRay {
     /// 2^-511 or 2^511: numbers that have no room for products.
     #[inline(always)]
     pub(crate) fn enter(ray: &Ray<f64>, transform: &Transform, object: &Extent) -> Option<Self> {
-        let Extent { center, half } = *object;
+        let Extent { center, magnitude, half } = *object;
         let origin = transform.point_to_object(ray.origin);
         let direction = transform.vector_to_object(ray.direction);
-        let length = direction.abs().max_element().power_of_two_below();
-        let direction = direction * (1.0 / length);
-        if !(origin.is_finite() && direction.is_finite() && (1.0..2.0).contains(&direction.abs().max_element())) {
+        // The power of two below the largest component: its exponent alone, which is not that of 0, of a denormal, of
+        // infinity or of what is not a number.
+        let exponent = largest(direction).to_bits() & EXPONENT;
+        // Times 0, what is not finite is not a number.
+        let nothing = (origin * 0.0 + direction * 0.0).dot(DVec3::ONE);
+        if exponent.wrapping_sub(512 << 52) > 1022 << 52 || nothing.is_nan() {
             return None;
         }
+        let length = f64::from_bits(exponent);
+        // Exact: the biased exponents of the two add up to twice the bias.
+        let unit = f64::from_bits((2046 << 52) - exponent);
+        let direction = direction * unit;
         let relative = origin - center;
-        let (mut shift, mut off) = (0.0, 0.0);
-        if relative.abs().max_element() > FAR * half {
+        let (mut moved, mut shift, mut off) = (origin, 0.0, 0.0);
+        let mut farthest = largest(relative) + half;
+        if farthest > (FAR + 1.0) * half {
             // From the point nearest to the centre back by the size of the box, which is more than half its diagonal.
             shift = -relative.dot(direction) / direction.dot(direction) - 2.0 * half;
             // Components of the direction are below 2. The f64 tests see the object from the true origin, with some more
             // roundings of the same size.
             off = shift.abs() * (32.0 * f64::UNIT_ROUNDOFF);
+            moved = origin + direction * shift;
+            farthest = largest(moved - center) + half;
         }
-        let moved = origin + direction * shift;
-        let interval = [ray.t_min * length, ray.t_max * length];
-        let farthest = (moved - center).abs().max_element() + half;
-        let (origin32, direction32) = (moved.as_vec3(), direction.as_vec3());
-        Some(Self { origin, direction, t_scale: length, shift, interval, moved, off, farthest, origin32, direction32 })
+        // The moved origin is no larger than its distance and the centre.
+        let most = farthest * (9.1 * U) + (magnitude * (1.1 * U) + off);
+        // Four more u|o|: for rounding the origin, adding this to it, multiplying it with the reciprocal (where the
+        // test does so), and to spare. And four uR for the two roundings of the wide tree's test, which are relative to
+        // the distance.
+        let delta = most * 8.0 + (farthest + magnitude) * (12.0 * U) + TINY;
+        Some(Self {
+            origin,
+            direction,
+            t_scale: length,
+            t_unscale: unit,
+            shift,
+            world: [ray.t_min, ray.t_max],
+            off,
+            farthest,
+            most,
+            delta: delta.to_f32(),
+            near: (farthest + shift.abs()) * (4.0 / (1u64 << 20) as f64),
+            length_squared: direction.length_squared(),
+            origin32: moved.as_vec3(),
+            direction32: direction.as_vec3(),
+        })
+    }
+
+    /// The moved origin.
+    #[inline]
+    fn moved(&self) -> DVec3 {
+        self.origin + self.direction * self.shift
+    }
+
+    /// The ray's interval in this space's parameter.
+    #[inline]
+    pub(crate) fn interval(&self) -> [f64; 2] {
+        [self.world[0] * self.t_scale, self.world[1] * self.t_scale]
     }
 
     /// How far from the ray, in each axis, a primitive may lie that the tests accept.
     #[inline]
     pub(crate) fn reach(&self) -> DVec3 {
-        self.moved.abs() * U + (8.0 * U * self.farthest + self.off)
+        self.moved().abs() * U + (8.0 * U * self.farthest + self.off)
     }
 
-    /// Setup of the box test: plain, or `PADDED` so that boxes are met as if larger by more than [`LocalRay::reach`].
+    /// Not below [`LocalRay::reach`] in any axis, at less cost.
+    #[inline(always)]
+    pub(crate) fn most_reach(&self) -> f64 {
+        self.most
+    }
+
+    /// Setup of the box test: plain, or `PADDED` so that boxes are met as if larger by [`LocalRay::delta`].
     #[inline(always)]
     pub(crate) fn slabs<const PADDED: bool>(&self) -> Slabs<f32> {
         let slabs = Slabs::new(self.origin32, self.direction32);
         if !PADDED {
             return slabs;
         }
-        slabs.widened(self.delta())
-    }
-
-    /// By how much, in each axis, boxes are met as if larger: more than [`LocalRay::reach`].
-    #[inline(always)]
-    pub(crate) fn delta(&self) -> Vec3 {
-        // Four more u|o|: for rounding the origin, adding this to it, multiplying it with the reciprocal (where the
-        // test does so), and to spare; 2uR to be above `reach` whatever rounds.
-        (self.moved.abs() * (5.0 * U) + (10.0 * U * self.farthest + self.off + TINY)).as_vec3()
+        slabs.widened(Vec3::splat(self.delta))
     }
 
     /// A parameter of the world's ray as the start of the box tests' interval: not above it.
@@ -166,7 +230,7 @@ impl LocalRay {
         // By how much vertices are off, seen from the ray.
         let (origin, off) = match precision {
             // Moeller and Trumbore's test rounds otherwise, but no less.
-            Precision::Fast | Precision::Robust => (self.moved, self.reach().max_element()),
+            Precision::Fast | Precision::Robust => (self.moved(), self.reach().max_element()),
             Precision::Double => {
                 let farthest = vertices.iter().fold(0.0f64, |m, v| m.max((*v - self.origin).abs().max_element()));
                 (self.origin, 8.0 * f64::UNIT_ROUNDOFF * farthest)
@@ -205,11 +269,11 @@ impl LocalRay {
     /// Raises `t` (local, counted from the true origin) to where the ray enters the primitive's own box, and lowers it
     /// to where it leaves: the rule by which a hit never lies before a box that holds it, so that skipping boxes cannot
     /// change the answer. The box is widened by [`LocalRay::reach`]; `None` when the ray misses even that.
-    #[inline(always)]
+    #[inline(never)]
     pub(crate) fn within_box(&self, t: f64, aabb: &Aabb<f64>) -> Option<f64> {
         let reach = self.reach();
         let wide = Aabb::new(aabb.min - reach, aabb.max + reach);
-        let slabs = Slabs::new(self.moved, self.direction);
+        let slabs = Slabs::new(self.moved(), self.direction);
         let (enter, leave) = slabs.padded(&wide, f64::NEG_INFINITY, f64::INFINITY);
         (enter <= leave).then(|| t.min(leave + self.shift).max(enter + self.shift))
     }

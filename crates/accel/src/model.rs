@@ -1,15 +1,18 @@
 //! One mesh with its tree, in normalised `f32` space.
 
+use core::marker::PhantomData;
 use core::ops::{ControlFlow, Range};
 use std::borrow::Cow;
 
-use firsthit_geometry::{Aabb, Precision, Primitive, Ray, Real, Shape, SurfaceHit, exact::Root, triangle};
+use firsthit_geometry::{
+    Aabb, Precision, Primitive, Ray, Real, Shape, SurfaceHit, exact::Root, transform::Transform, triangle,
+};
 use glam::{DVec3, Vec3};
 
 use crate::build::Topology;
 use crate::kernel::{Found, Kernel, double};
 use crate::layout::Bvh2;
-use crate::layout::wide8::Wide8;
+use crate::layout::wide8::{self, Wide8};
 use crate::local::{Extent, LocalRay};
 use crate::normalise::common_scale;
 use crate::query::{Candidate, Collector, Dyn};
@@ -17,7 +20,7 @@ use crate::simd::{self, Available, Lanes, Work};
 use crate::stats::Probe;
 use crate::traverse::traverse;
 use crate::wide::{self, BoxRay, Visit};
-use crate::{BuildError, BuildOptions, Geometry, Layout};
+use crate::{BuildError, BuildOptions, Geometry, Guards, HitId, Layout};
 
 /// The parts of one mesh, ready to be traced.
 #[derive(Clone, Debug)]
@@ -38,6 +41,7 @@ pub(crate) struct Model {
     bounds: Aabb<f64>,
     extent: Extent,
     degenerate: u64,
+    guards: Guards,
 }
 
 /// The tree with its triangles, which lie in the order of the leaves, divided by the model's scale.
@@ -108,6 +112,7 @@ impl Model {
             bounds: Aabb::empty(),
             extent: Extent::default(),
             degenerate: 0,
+            guards: options.guards,
         };
         // Everything in file order first.
         let mut triangles = Vec::new();
@@ -159,7 +164,11 @@ impl Model {
         model.extent = Extent::new(&model.bounds);
         let small = model.bounds.is_empty() || model.bounds.min.abs().max(model.bounds.max.abs()).max_element() < 4.0;
         // Shapes have no place in blocks of triangles; and products of three large numbers would overflow there.
-        let layout = if model.shapes.is_empty() && small { options.layout } else { Layout::Bvh2 };
+        let layout = if model.shapes.is_empty() && small && triangles.len() <= wide8::MOST_TRIANGLES {
+            options.layout
+        } else {
+            Layout::Bvh2
+        };
         let number = |&i: &u32| numbers.get(i as usize).copied().unwrap_or(u32::MAX);
         match layout {
             Layout::Bvh2 => {
@@ -283,24 +292,39 @@ impl Model {
         }
     }
 
-    /// Offers the hits of what is in the tree to the collector.
+    /// Offers the hits of what is in the tree to the collector; `transform` is the instance's.
     #[inline(always)]
     pub(crate) fn trace<const SURFACES: bool, K: Kernel, C: Collector, P: Probe>(
         &self,
-        ray: &LocalRay,
-        instance: u32,
+        ray: &Ray<f64>,
+        (instance, transform): (u32, &Transform),
         precision: Precision,
         collector: &mut C,
         probe: &mut P,
     ) -> ControlFlow<()> {
         match &self.tree {
             MeshTree::Wide { tree, level } => {
-                let offer = OfferTriangle::<SURFACES, K>::new(self, ray, instance, collector);
-                simd::run(*level, TraceWide { tree, offer, collector, probe })
+                let kernel = PhantomData::<K>;
+                simd::run(
+                    *level,
+                    TraceWide::<SURFACES, K, C, P> {
+                        model: self,
+                        tree,
+                        transform,
+                        ray,
+                        instance,
+                        collector,
+                        probe,
+                        kernel,
+                    },
+                )
             }
             // Any collector through a pointer, so that this is not compiled for each. Meshes of triangles alone pay
             // nothing for shapes.
             MeshTree::Binary { tree, triangles, .. } => {
+                let Some(ray) = &LocalRay::enter(ray, transform, &self.extent) else {
+                    return ControlFlow::Continue(());
+                };
                 let any = &mut Dyn(collector);
                 if self.shapes.is_empty() {
                     self.trace_binary::<SURFACES, false, K, P>(tree, triangles, ray, instance, precision, any, probe)
@@ -308,6 +332,42 @@ impl Model {
                     self.trace_binary::<SURFACES, true, K, P>(tree, triangles, ray, instance, precision, any, probe)
                 }
             }
+        }
+    }
+
+    /// The wide tree, if that is what there is.
+    #[inline(always)]
+    pub(crate) fn wide(&self) -> Option<(&Wide8, Available)> {
+        if let MeshTree::Wide { tree, level } = &self.tree { Some((tree, *level)) } else { None }
+    }
+
+    /// [`Model::trace`] by the instructions of a level.
+    #[inline(always)]
+    pub(crate) fn trace_wide<L: Lanes, const SURFACES: bool, K: Kernel, C: Collector, P: Probe>(
+        &self,
+        tree: &Wide8,
+        ray: &Ray<f64>,
+        (instance, transform): (u32, &Transform),
+        collector: &mut C,
+        probe: &mut P,
+    ) -> ControlFlow<()> {
+        let Some(ray) = LocalRay::enter(ray, transform, &self.extent) else { return ControlFlow::Continue(()) };
+        let ray = &ray;
+        let offer = OfferTriangle::<SURFACES, K>::new(self, ray, instance, collector);
+        let filter = K::filter::<L>(&offer.setup, ray);
+        let boxes = BoxRay {
+            origin: ray.origin32,
+            direction: ray.direction32,
+            delta: if K::padded(&offer.setup) { ray.delta } else { 0.0 },
+            t_min: ray.box_t_min(collector.t_min()),
+            t_max: ray.box_t_max(collector.t_max()),
+        };
+        let ordered = collector.ordered();
+        let mut visitor = OfferTo { offer, collector };
+        if ordered {
+            wide::traverse::<L, _, P, true>(tree, &boxes, &filter, probe, &mut visitor)
+        } else {
+            wide::traverse::<L, _, P, false>(tree, &boxes, &filter, probe, &mut visitor)
         }
     }
 
@@ -327,26 +387,27 @@ impl Model {
         let t_min = ray.box_t_min(collector.t_min());
         let t_max = ray.box_t_max(collector.t_max());
         let mut end = t_max;
+        let padded = K::padded(&offer.setup);
         let leaf = |range: Range<usize>, probe: &mut P| {
             for place in range {
-                probe.primitive();
+                probe.primitives(1);
                 let shape = || self.places.get(self.id(place)?.geometry as usize);
                 if SHAPES && let Some(Places::Shape(index)) = shape() {
                     let taken = if precision == Precision::Exact {
                         self.offer_exact_shape::<SURFACES, _, P>(*index, ray, instance, collector, probe)?
                     } else {
-                        self.offer_shape(*index, ray, instance, precision, K::CLAMPED, collector)?
+                        self.offer_shape(*index, ray, instance, precision, K::clamped(&offer.setup), collector)?
                     };
                     if taken {
                         end = offer.shortened(collector);
                     }
-                } else if let Some(shorter) = offer.offer(place, &triangles[place], collector, probe)? {
+                } else if let Some(shorter) = offer.offer(place, &triangles[place], None, collector, probe)? {
                     end = shorter;
                 }
             }
             ControlFlow::Continue(end)
         };
-        if K::PADDED {
+        if padded {
             traverse::<true, _, _, _>(tree, &ray.slabs::<true>(), t_min, t_max, probe, leaf)
         } else {
             traverse::<false, _, _, _>(tree, &ray.slabs::<false>(), t_min, t_max, probe, leaf)
@@ -383,7 +444,7 @@ impl Model {
     ) -> ControlFlow<(), bool> {
         let Some(entry) = self.shapes.get(index as usize) else { return ControlFlow::Continue(false) };
         // The ray's own interval: what is left of it ends at a t that is rounded, and is compared with rounded ones.
-        let [t_min, t_max] = ray.interval;
+        let [t_min, t_max] = ray.interval();
         let local = Ray { origin: ray.origin * self.scale, direction: ray.direction * self.scale, t_min, t_max };
         let mut outcome = ControlFlow::Continue(false);
         let fallback = entry.shape.visit_exact(&local, &mut |found, _| {
@@ -391,10 +452,9 @@ impl Model {
             if SURFACES && !found.crosses {
                 return ControlFlow::Continue(());
             }
-            outcome = collector.offer(Candidate {
-                normal: hit.normal.unwrap_or(DVec3::ZERO),
-                ..Candidate::new(instance, entry.geometry, 0, hit.t / ray.t_scale, hit.u as f32, hit.v as f32)
-            });
+            let id = HitId { instance, geometry: entry.geometry, primitive: 0 };
+            let normal = hit.normal.unwrap_or(DVec3::ZERO);
+            outcome = collector.offer(Candidate::new(id, hit.t * ray.t_unscale, hit.u as f32, hit.v as f32, normal));
             // The nearest that is taken is enough.
             if matches!(outcome, ControlFlow::Continue(false)) {
                 ControlFlow::Continue(())
@@ -430,10 +490,10 @@ impl Model {
             let Some(hit) = shape_hit(&entry.shape, &local, precision) else { break };
             let t = if clamped { ray.within_box(hit.t, &entry.bounds) } else { Some(hit.t) };
             if let Some(t) = t {
-                let taken = collector.offer(Candidate {
-                    normal: hit.normal.unwrap_or(DVec3::ZERO),
-                    ..Candidate::new(instance, entry.geometry, 0, t / ray.t_scale, hit.u as f32, hit.v as f32)
-                })?;
+                let id = HitId { instance, geometry: entry.geometry, primitive: 0 };
+                let normal = hit.normal.unwrap_or(DVec3::ZERO);
+                let t = t * ray.t_unscale;
+                let taken = collector.offer(Candidate::new(id, t, hit.u as f32, hit.v as f32, normal))?;
                 if taken {
                     return ControlFlow::Continue(true);
                 }
@@ -481,7 +541,7 @@ struct OfferTriangle<'a, const SURFACES: bool, K: Kernel> {
 impl<'a, const SURFACES: bool, K: Kernel> OfferTriangle<'a, SURFACES, K> {
     #[inline(always)]
     fn new<C: Collector>(model: &'a Model, ray: &'a LocalRay, instance: u32, collector: &C) -> Self {
-        Self { model, ray, instance, setup: K::setup(ray), limit: collector.t_max() * ray.t_scale }
+        Self { model, ray, instance, setup: K::setup(ray, model.guards), limit: collector.t_max() * ray.t_scale }
     }
 
     /// The new end of the boxes' interval if the hit was taken.
@@ -490,23 +550,32 @@ impl<'a, const SURFACES: bool, K: Kernel> OfferTriangle<'a, SURFACES, K> {
         &mut self,
         place: usize,
         triangle: &[Vec3; 3],
+        known: Option<[f32; 3]>,
         collector: &mut C,
         probe: &mut P,
     ) -> ControlFlow<(), Option<f32>> {
-        let found = if SURFACES {
-            K::crosses(&self.setup, self.ray, triangle, self.limit)
-        } else {
-            K::test(&self.setup, self.ray, triangle, self.limit)
+        let found = match known {
+            _ if SURFACES => K::crosses(&self.setup, self.ray, triangle, self.limit),
+            Some(known) => K::test_known(&self.setup, self.ray, triangle, known, self.limit),
+            None => K::test(&self.setup, self.ray, triangle, self.limit),
         };
-        let Some(Found { t, u, v, fallback }) = found else { return ControlFlow::Continue(None) };
+        let Some(Found { mut t, u, v, normal, grazing, fallback }) = found else { return ControlFlow::Continue(None) };
         if fallback {
             probe.fallback();
         }
-        let t = if K::CLAMPED { within_triangle(self.ray, t, triangle) } else { Some(t) };
-        let (Some(t), Some(id)) = (t, self.model.id(place)) else { return ControlFlow::Continue(None) };
-        let t = t / self.ray.t_scale;
-        let taken = collector.offer(Candidate::new(self.instance, id.geometry, id.primitive, t, u, v))?;
-        ControlFlow::Continue(taken.then(|| self.shortened(collector)))
+        if grazing && K::clamped(&self.setup) {
+            let Some(within) = within_triangle(self.ray, t, triangle) else { return ControlFlow::Continue(None) };
+            t = within;
+        }
+        let t = t * self.ray.t_unscale;
+        // Before anything is fetched about it.
+        if !(collector.t_min() <= t && t <= collector.t_max()) {
+            return ControlFlow::Continue(None);
+        }
+        let Some(id) = self.model.id(place) else { return ControlFlow::Continue(None) };
+        let id = HitId { instance: self.instance, geometry: id.geometry, primitive: id.primitive };
+        let taken = collector.offer(Candidate::new(id, t, u, v, normal))?;
+        ControlFlow::Continue(if taken { Some(self.shortened(collector)) } else { None })
     }
 
     /// The end of the boxes' interval, now that a hit was taken.
@@ -518,11 +587,15 @@ impl<'a, const SURFACES: bool, K: Kernel> OfferTriangle<'a, SURFACES, K> {
 }
 
 /// Traversal of the wide tree.
-struct TraceWide<'a, const SURFACES: bool, K: Kernel, C, P> {
+struct TraceWide<'a, const SURFACES: bool, K, C, P> {
+    model: &'a Model,
     tree: &'a Wide8,
-    offer: OfferTriangle<'a, SURFACES, K>,
+    transform: &'a Transform,
+    ray: &'a Ray<f64>,
+    instance: u32,
     collector: &'a mut C,
     probe: &'a mut P,
+    kernel: PhantomData<K>,
 }
 
 impl<const SURFACES: bool, K: Kernel, C: Collector, P: Probe> Work for TraceWide<'_, SURFACES, K, C, P> {
@@ -530,24 +603,8 @@ impl<const SURFACES: bool, K: Kernel, C: Collector, P: Probe> Work for TraceWide
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> ControlFlow<()> {
-        let Self { tree, offer, collector, probe } = self;
-        let ray = offer.ray;
-        let filter = K::filter::<L>(&offer.setup, ray);
-        let boxes = BoxRay {
-            origin: ray.origin32,
-            direction: ray.direction32,
-            delta: if K::PADDED { ray.delta() } else { Vec3::ZERO },
-            padded: K::PADDED,
-            t_min: ray.box_t_min(collector.t_min()),
-            t_max: ray.box_t_max(collector.t_max()),
-        };
-        let ordered = collector.ordered();
-        let mut visitor = OfferTo { offer, collector };
-        if ordered {
-            wide::traverse::<L, _, P, true>(tree, &boxes, &filter, probe, &mut visitor)
-        } else {
-            wide::traverse::<L, _, P, false>(tree, &boxes, &filter, probe, &mut visitor)
-        }
+        let Self { model, tree, transform, ray, instance, collector, probe, .. } = self;
+        model.trace_wide::<L, SURFACES, K, C, P>(tree, ray, (instance, transform), collector, probe)
     }
 }
 
@@ -559,13 +616,20 @@ struct OfferTo<'a, const SURFACES: bool, K: Kernel, C> {
 
 impl<const SURFACES: bool, K: Kernel, C: Collector, P: Probe> Visit<P> for OfferTo<'_, SURFACES, K, C> {
     #[inline(always)]
-    fn visit(&mut self, place: usize, triangle: &[Vec3; 3], probe: &mut P) -> ControlFlow<(), Option<f32>> {
-        self.offer.offer(place, triangle, self.collector, probe)
+    fn visit(
+        &mut self,
+        place: usize,
+        triangle: &[Vec3; 3],
+        known: [f32; 3],
+        probe: &mut P,
+    ) -> ControlFlow<(), Option<f32>> {
+        self.offer.offer(place, triangle, Some(known), self.collector, probe)
     }
 }
 
 /// [`LocalRay::within_box`] for a triangle.
-#[inline(always)]
+#[cold]
+#[inline(never)]
 fn within_triangle(ray: &LocalRay, t: f64, vertices: &[Vec3; 3]) -> Option<f64> {
     let [a, b, c] = double(vertices);
     ray.within_box(t, &Aabb::new(a.min(b).min(c), a.max(b).max(c)))

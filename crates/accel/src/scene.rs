@@ -1,20 +1,23 @@
 //! The scene: built once, then only asked.
 
+use core::marker::PhantomData;
 use core::ops::{ControlFlow, Range};
 use std::sync::Arc;
 
-use firsthit_geometry::{Aabb, Precision, Ray, Real, slab::Slabs, triangle};
+use firsthit_geometry::{Aabb, Precision, Ray, Real, slab::Slabs, transform::Transform};
 use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 
 use crate::build::Topology;
 use crate::instance::{Instance, tight_boxes};
-use crate::kernel::{Double, Exact, Fast, Kernel, Robust};
+use crate::kernel::{Double, Exact, Fast, Guarded, Kernel, Robust};
+use crate::layout::wide8::Wide8;
 use crate::layout::{Bvh2, Tree};
 use crate::local::LocalRay;
 use crate::model::{Model, PrimitiveId, Surface, limit};
 use crate::query::{Any, Closest, Collect, Collector, Dyn};
-use crate::stats::{Off, Probe};
+use crate::simd::{self, Available, Lanes, Work};
+use crate::stats::{Off, Probe, Watch};
 use crate::traverse::traverse;
 use crate::{BuildError, BuildOptions, Crossings, Geometry, Guards, Hit, HitId, TraversalCounts};
 
@@ -107,7 +110,7 @@ impl Scene {
     /// The nearest hit in the ray's closed interval; `None` also for an invalid ray.
     #[must_use]
     pub fn closest_hit(&self, ray: &Ray<f64>) -> Option<Hit> {
-        self.closest(ray, &mut Off)
+        self.inner.by_kernel(ClosestHit { scene: self, ray })
     }
 
     /// The nearest hit that `accept` accepts, other than on the flat primitive `source` that the ray starts from.
@@ -127,14 +130,13 @@ impl Scene {
         let mut closest = Collect::new(ray, self.flat(source), accept, Closest { order, best: None });
         // It never breaks: the nearest hit is known at the end only.
         let _ = self.collect(ray, Crossings::Triangles, &mut closest);
-        self.finished(closest.take.best)
+        closest.take.best.map(|hit| self.finished(hit))
     }
 
     /// Whether anything lies in the ray's closed interval: true exactly when [`Scene::closest_hit`] finds something.
     #[must_use]
     pub fn any_hit(&self, ray: &Ray<f64>) -> bool {
-        let mut any = Collect::new(ray, None, |_| true, Any);
-        self.inner.trace::<false, _, _>(ray, &mut any, &mut Off).is_break()
+        self.inner.by_kernel(AnyHit { scene: self, ray })
     }
 
     /// As [`Scene::any_hit`] with a filter: see [`Scene::closest_hit_filtered`]. A filter that always says no is asked
@@ -148,9 +150,9 @@ impl Scene {
     /// As [`Scene::closest_hit`], with what it cost.
     #[must_use]
     pub fn closest_hit_counted(&self, ray: &Ray<f64>) -> (Option<Hit>, TraversalCounts) {
-        let mut counts = TraversalCounts::default();
-        let hit = self.closest(ray, &mut counts);
-        (hit, counts)
+        let mut watch = Watch::default();
+        let hit = self.closest_watched(ray, &mut watch);
+        (hit, watch.counts)
     }
 
     /// A box around everything that is bounded (infinite planes do not count); empty for an empty scene.
@@ -179,12 +181,12 @@ impl Scene {
         &self.inner.instances
     }
 
-    /// [`Scene::closest_hit`] with a probe: compiled for this collector alone, since it is what most rays ask.
-    pub(crate) fn closest<P: Probe>(&self, ray: &Ray<f64>, probe: &mut P) -> Option<Hit> {
+    /// [`Scene::closest_hit`] with a probe.
+    pub(crate) fn closest_watched(&self, ray: &Ray<f64>, watch: &mut Watch) -> Option<Hit> {
         let order = |a: &Hit, b: &Hit| self.order(ray, a, b);
         let mut closest = Collect::new(ray, None, |_| true, Closest { order, best: None });
-        let _ = self.inner.trace::<false, _, _>(ray, &mut closest, probe);
-        self.finished(closest.take.best)
+        let _ = self.collect_watched(ray, Crossings::Triangles, &mut closest, watch);
+        closest.take.best.map(|hit| self.finished(hit))
     }
 
     /// Offers all hits to any collector: called through a pointer, so that the traversals of all tiers are not compiled
@@ -213,10 +215,6 @@ impl Scene {
         }
     }
 
-    fn finished(&self, best: Option<Hit>) -> Option<Hit> {
-        best.map(|hit| Hit { normal: self.world_normal(&hit), ..hit })
-    }
-
     /// The primitive to skip: only what a straight ray cannot meet twice.
     #[inline(always)]
     pub(crate) fn flat(&self, source: Option<HitId>) -> Option<HitId> {
@@ -234,65 +232,164 @@ impl Scene {
         Some((instance, surface))
     }
 
-    pub(crate) fn world_normal(&self, hit: &Hit) -> DVec3 {
-        match self.surface(&hit.id) {
-            Some((instance, Surface::Triangle(v))) => {
-                // Not unit yet: the transform sees to it.
-                instance.transform.normal(triangle::area_vector(v))
-            }
-            Some((instance, Surface::Shape(_))) => instance.transform.normal(hit.normal),
-            None => DVec3::ZERO,
-        }
+    /// A hit as users get it: its normal is that of the world.
+    #[inline(always)]
+    pub(crate) fn finished(&self, hit: Hit) -> Hit {
+        let instance = self.inner.instances.get(hit.id.instance as usize);
+        Hit { normal: instance.map_or(DVec3::ZERO, |i| i.transform.normal(hit.normal)), ..hit }
     }
 }
 
+/// Work that depends on the tier: the choice is made once, outside of it.
+trait ForKernel {
+    type Output;
+    fn run<K: Kernel>(self) -> Self::Output;
+}
+
+/// [`Scene::closest_hit`]: compiled for its collector alone, since it is what most rays ask.
+struct ClosestHit<'a> {
+    scene: &'a Scene,
+    ray: &'a Ray<f64>,
+}
+
+impl ForKernel for ClosestHit<'_> {
+    type Output = Option<Hit>;
+
+    #[inline(always)]
+    fn run<K: Kernel>(self) -> Option<Hit> {
+        let Self { scene, ray } = self;
+        if let Some((level, only)) = scene.inner.only() {
+            return simd::run(level, ClosestHitOf::<K> { only, scene, ray, kernel: PhantomData });
+        }
+        let order = |a: &Hit, b: &Hit| scene.order(ray, a, b);
+        let mut closest = Collect::new(ray, None, |_| true, Closest { order, best: None });
+        // It never breaks: the nearest hit is known at the end only.
+        let _ = scene.inner.trace_by::<false, K, _, _>(ray, &mut closest, &mut Off);
+        closest.take.best.map(|hit| scene.finished(hit))
+    }
+}
+
+/// [`Scene::any_hit`], likewise.
+struct AnyHit<'a> {
+    scene: &'a Scene,
+    ray: &'a Ray<f64>,
+}
+
+impl ForKernel for AnyHit<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<K: Kernel>(self) -> bool {
+        let Self { scene, ray } = self;
+        if let Some((level, only)) = scene.inner.only() {
+            return simd::run(level, AnyHitOf::<K> { only, ray, kernel: PhantomData });
+        }
+        let mut any = Collect::new(ray, None, |_| true, Any);
+        scene.inner.trace_by::<false, K, _, _>(ray, &mut any, &mut Off).is_break()
+    }
+}
+
+/// The only instance of a scene, of a model with a wide tree: there is nothing above it to be traversed.
+#[derive(Clone, Copy)]
+struct Only<'a> {
+    model: &'a Model,
+    tree: &'a Wide8,
+    transform: &'a Transform,
+}
+
+impl Only<'_> {
+    #[inline(always)]
+    fn trace<L: Lanes, K: Kernel, C: Collector>(&self, ray: &Ray<f64>, collector: &mut C) -> ControlFlow<()> {
+        // What is not finite is found out on entering the mesh.
+        if !is_interval(ray) {
+            return ControlFlow::Continue(());
+        }
+        self.model.trace_wide::<L, false, K, C, Off>(self.tree, ray, (0, self.transform), collector, &mut Off)
+    }
+}
+
+/// [`ClosestHit`] in the only instance.
+struct ClosestHitOf<'a, K> {
+    only: Only<'a>,
+    scene: &'a Scene,
+    ray: &'a Ray<f64>,
+    kernel: PhantomData<K>,
+}
+
+impl<K: Kernel> Work for ClosestHitOf<'_, K> {
+    type Output = Option<Hit>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Option<Hit> {
+        let Self { only, scene, ray, .. } = self;
+        let order = |a: &Hit, b: &Hit| scene.order(ray, a, b);
+        let mut closest = Collect::new(ray, None, |_| true, Closest { order, best: None });
+        let _ = only.trace::<L, K, _>(ray, &mut closest);
+        let hit = closest.take.best?;
+        Some(Hit { normal: only.transform.normal(hit.normal), ..hit })
+    }
+}
+
+/// [`AnyHit`] in the only instance.
+struct AnyHitOf<'a, K> {
+    only: Only<'a>,
+    ray: &'a Ray<f64>,
+    kernel: PhantomData<K>,
+}
+
+impl<K: Kernel> Work for AnyHitOf<'_, K> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> bool {
+        let mut any = Collect::new(self.ray, None, |_| true, Any);
+        self.only.trace::<L, K, _>(self.ray, &mut any).is_break()
+    }
+}
+
+/// Whether the ray's interval has anything in it; false for NaN.
+#[inline(always)]
+fn is_interval(ray: &Ray<f64>) -> bool {
+    ray.t_min <= ray.t_max
+}
+
 impl Inner {
+    #[inline(always)]
+    fn by_kernel<W: ForKernel>(&self, work: W) -> W::Output {
+        match self.options.precision {
+            Precision::Fast => work.run::<Fast>(),
+            Precision::Robust if self.options.guards.contains(Guards::ALL.difference(Guards::OFFSET)) => {
+                work.run::<Robust>()
+            }
+            Precision::Robust => work.run::<Guarded>(),
+            Precision::Double => work.run::<Double>(),
+            Precision::Exact => work.run::<Exact>(),
+        }
+    }
+
+    #[inline(always)]
+    fn only(&self) -> Option<(Available, Only<'_>)> {
+        let [instance] = &self.instances[..] else { return None };
+        let model = &self.models[instance.model as usize];
+        let (tree, level) = model.wide()?;
+        Some((level, Only { model, tree, transform: &instance.transform }))
+    }
+
     /// Offers hits to the collector, by the tests of the scene's tier.
-    #[inline]
     fn trace<const SURFACES: bool, C: Collector, P: Probe>(
         &self,
         ray: &Ray<f64>,
         collector: &mut C,
         probe: &mut P,
     ) -> ControlFlow<()> {
-        if !ray.is_valid() {
-            return ControlFlow::Continue(());
-        }
         match self.options.precision {
             Precision::Fast => self.trace_by::<SURFACES, Fast, C, P>(ray, collector, probe),
             Precision::Robust if self.options.guards.contains(Guards::ALL.difference(Guards::OFFSET)) => {
-                self.trace_by::<SURFACES, Robust<true, true, true, true>, C, P>(ray, collector, probe)
+                self.trace_by::<SURFACES, Robust, C, P>(ray, collector, probe)
             }
-            Precision::Robust => self.trace_guarded::<SURFACES, C, P>(ray, collector, probe),
+            Precision::Robust => self.trace_by::<SURFACES, Guarded, C, P>(ray, collector, probe),
             Precision::Double => self.trace_by::<SURFACES, Double, C, P>(ray, collector, probe),
             Precision::Exact => self.trace_by::<SURFACES, Exact, C, P>(ray, collector, probe),
-        }
-    }
-
-    /// The robust tier without some of its guards.
-    fn trace_guarded<const SURFACES: bool, C: Collector, P: Probe>(
-        &self,
-        ray: &Ray<f64>,
-        collector: &mut C,
-        probe: &mut P,
-    ) -> ControlFlow<()> {
-        macro_rules! by {
-            ($($guard:literal),*) => { self.trace_by::<SURFACES, Robust<$($guard),*>, C, P>(ray, collector, probe) };
-        }
-        let on = |guard| self.options.guards.contains(guard);
-        match (on(Guards::PADDING), on(Guards::WATERTIGHT), on(Guards::FALLBACK), on(Guards::PLANE_T)) {
-            (false, false, _, false) => by!(false, false, false, false),
-            (false, false, _, true) => by!(false, false, false, true),
-            (false, true, false, false) => by!(false, true, false, false),
-            (false, true, false, true) => by!(false, true, false, true),
-            (false, true, true, false) => by!(false, true, true, false),
-            (false, true, true, true) => by!(false, true, true, true),
-            (true, false, _, false) => by!(true, false, false, false),
-            (true, false, _, true) => by!(true, false, false, true),
-            (true, true, false, false) => by!(true, true, false, false),
-            (true, true, false, true) => by!(true, true, false, true),
-            (true, true, true, false) => by!(true, true, true, false),
-            (true, true, true, true) => by!(true, true, true, true),
         }
     }
 
@@ -302,6 +399,10 @@ impl Inner {
         collector: &mut C,
         probe: &mut P,
     ) -> ControlFlow<()> {
+        // Whether it is finite is seen on entering a mesh.
+        if !is_interval(ray) {
+            return ControlFlow::Continue(());
+        }
         let precision = self.options.precision;
         for &i in &self.unbounded {
             let instance = &self.instances[i as usize];
@@ -318,18 +419,16 @@ impl Inner {
             for &i in &self.order[range] {
                 let instance = &self.instances[i as usize];
                 let model = &self.models[instance.model as usize];
-                if let Some(local) = LocalRay::enter(ray, &instance.transform, model.extent()) {
-                    model.trace::<SURFACES, K, C, P>(&local, i, precision, collector, probe)?;
-                }
+                model.trace::<SURFACES, K, C, P>(ray, (i, &instance.transform), precision, collector, probe)?;
             }
             ControlFlow::Continue(beyond(collector.t_max()))
         };
         match self.tree.root() {
-            // One instance, or a few: nothing to prepare.
             Some(root) if root.is_leaf() => leaf(root.range(), probe).map_continue(drop),
+            _ if !ray.is_valid() => ControlFlow::Continue(()),
             _ => {
                 let slabs = Slabs::new(ray.origin, ray.direction);
-                if K::PADDED {
+                if K::PADDED_ABOVE {
                     let slabs = slabs.widened(self.entering(ray));
                     traverse::<true, _, _, _>(&self.tree, &slabs, before, t_max, probe, leaf)
                 } else {

@@ -30,11 +30,11 @@ pub(crate) fn traverse<const PADDED: bool, R: Real, T: Tree<R>, P: Probe>(
         } else {
             probe.boxes(2);
             let ([left, right], meets, enter) = tree.children::<PADDED>(current.first, ray, t_min, t_max);
-            let meets = if P::PRUNE { meets } else { [true; 2] };
+            let meets = if probe.prunes() { meets } else { [true; 2] };
             // Chosen by value: an index into the pair would send it through memory.
             match meets {
                 [true, true] => {
-                    let right_first = (enter[1] < enter[0]) != P::REVERSED;
+                    let right_first = (enter[1] < enter[0]) != probe.reversed();
                     let (near, far) = if right_first { (right, left) } else { (left, right) };
                     stack.push((far, if right_first { enter[0] } else { enter[1] }));
                     current = near;
@@ -53,7 +53,7 @@ pub(crate) fn traverse<const PADDED: bool, R: Real, T: Tree<R>, P: Probe>(
         }
         loop {
             let Some((child, enter)) = stack.pop() else { return ControlFlow::Continue(()) };
-            if enter <= t_max || !P::PRUNE {
+            if enter <= t_max || !probe.prunes() {
                 current = child;
                 break;
             }

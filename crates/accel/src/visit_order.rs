@@ -3,7 +3,7 @@
 use firsthit_geometry::Ray;
 
 use crate::query::{All, Collect};
-use crate::stats::{Exhaustive, FarFirst, Off};
+use crate::stats::Watch;
 use crate::{Crossings, Hit, Scene};
 
 /// How a traversal goes about it.
@@ -22,11 +22,8 @@ impl Scene {
     #[doc(hidden)]
     #[must_use]
     pub fn closest_hit_in_order(&self, ray: &Ray<f64>, order: VisitOrder) -> Option<Hit> {
-        match order {
-            VisitOrder::NearFirst => self.closest(ray, &mut Off),
-            VisitOrder::FarFirst => self.closest(ray, &mut FarFirst),
-            VisitOrder::Exhaustive => self.closest(ray, &mut Exhaustive),
-        }
+        let (reversed, exhaustive) = (order == VisitOrder::FarFirst, order == VisitOrder::Exhaustive);
+        self.closest_watched(ray, &mut Watch { reversed, exhaustive, ..Watch::default() })
     }
 
     /// [`Scene::all_hits`] without any box test: the same hits, in no particular order.
@@ -36,9 +33,10 @@ impl Scene {
         let mut hits = Vec::new();
         let mut all = Collect::new(ray, None, |_| true, All(&mut hits));
         // It never breaks.
-        let _ = self.collect_watched(ray, crossings, &mut all, &mut Exhaustive);
+        let watch = &mut Watch { exhaustive: true, ..Watch::default() };
+        let _ = self.collect_watched(ray, crossings, &mut all, watch);
         for hit in &mut hits {
-            hit.normal = self.world_normal(hit);
+            *hit = self.finished(*hit);
         }
         hits
     }

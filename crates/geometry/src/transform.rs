@@ -45,6 +45,8 @@ pub struct Transform {
     translation: DVec3,
     inverse: DMat3,
     normal: DMat3,
+    /// The linear part is a multiple of the identity, as that of most meshes: worth a test for every ray.
+    uniform: bool,
 }
 
 impl Transform {
@@ -72,7 +74,9 @@ impl Transform {
         }
         // The inverse transpose up to a positive factor: it keeps the outside outside when the map mirrors.
         let normal = cofactor * det.signum();
-        Ok(Self { linear: m.matrix3, translation: m.translation, inverse: inverse * (1.0 / k), normal })
+        let uniform = m.matrix3 == DMat3::IDENTITY * m.matrix3.x_axis.x;
+        let (linear, inverse) = (m.matrix3, inverse * (1.0 / k));
+        Ok(Self { linear, translation: m.translation, inverse, normal, uniform })
     }
 
     /// The linear part.
@@ -117,7 +121,8 @@ impl Transform {
     #[inline]
     #[must_use]
     pub fn normal(&self, n: DVec3) -> DVec3 {
-        (self.normal * n).normalize_or_zero()
+        let n = if self.uniform { n * self.normal.x_axis.x } else { self.normal * n };
+        n.normalize_or_zero()
     }
 
     /// A point of the world in the object's space. The translation is subtracted first, where nearby points cancel
@@ -125,14 +130,14 @@ impl Transform {
     #[inline]
     #[must_use]
     pub fn point_to_object(&self, p: DVec3) -> DVec3 {
-        self.inverse * (p - self.translation)
+        self.vector_to_object(p - self.translation)
     }
 
     /// A direction of the world in the object's space, not normalised.
     #[inline]
     #[must_use]
     pub fn vector_to_object(&self, v: DVec3) -> DVec3 {
-        self.inverse * v
+        if self.uniform { v * self.inverse.x_axis.x } else { self.inverse * v }
     }
 
     /// A ray of the world in the object's space; `t` keeps its meaning.

@@ -1,4 +1,7 @@
-//! The wide tree: eight children a node, eight triangles a block, tested eight at a time.
+//! The wide tree: eight children a node, up to eight triangles a leaf, tested eight at a time.
+//!
+//! Triangles lie in blocks of four. A leaf is a run of up to eight of them that reaches into two blocks at most, so
+//! neighbouring leaves may share a block and few lanes are empty.
 //!
 //! Made from the binary tree by dynamic programming over its nodes, as Wald, Benthin and Boulos, "Getting Rid of
 //! Packets" (2008) and Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide
@@ -20,7 +23,8 @@ pub(crate) struct Wide8 {
     sah_cost: f64,
 }
 
-/// A node or a run of blocks.
+/// A node, or a leaf: from the highest bit, whether it is one, number of triangles less one (3 bits), lane of the first
+/// (2), and its block (26).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Reference(pub(crate) u32);
 
@@ -31,40 +35,80 @@ impl Reference {
     fn node(index: usize) -> Self {
         Self(index as u32)
     }
-    fn block(index: usize) -> Self {
-        Self(index as u32 | Self::LEAF)
+    fn leaf(place: usize, count: usize) -> Self {
+        Self(Self::LEAF | (count as u32 - 1) << 28 | (place as u32 & 3) << 26 | (place / 4) as u32)
     }
     #[inline(always)]
     pub(crate) fn is_leaf(self) -> bool {
         self.0 & Self::LEAF != 0
     }
-    /// Of the node or of the block.
+    /// Of a node.
     #[inline(always)]
     pub(crate) fn index(self) -> usize {
-        (self.0 & !Self::LEAF) as usize
+        self.0 as usize
+    }
+    /// Of a leaf: its (first) block.
+    #[inline(always)]
+    pub(crate) fn block(self) -> usize {
+        (self.0 & (MOST_BLOCKS - 1)) as usize
+    }
+    /// Of a leaf: its lanes in two blocks.
+    #[inline(always)]
+    pub(crate) fn lanes(self) -> u32 {
+        let (count, first) = ((self.0 >> 28 & 7) + 1, self.0 >> 26 & 3);
+        ((1 << count) - 1) << first
     }
 }
+
+/// References have room for so many blocks.
+const MOST_BLOCKS: u32 = 1 << 26;
+
+/// A mesh of no more triangles surely fits: each leaf wastes three lanes at most, and holds one triangle at least.
+pub(crate) const MOST_TRIANGLES: usize = MOST_BLOCKS as usize;
 
 /// Eight boxes: four cache lines.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct Node {
-    /// By axis, lower and upper planes. Of a child that is missing, the lower plane is +infinity and the upper one
-    /// -infinity, so that no ray meets it.
-    pub(crate) planes: [[[f32; 8]; 2]; 3],
+    /// By axis, lower and upper planes: see [`Node::row`]. Of a child that is missing, the lower plane is +infinity and
+    /// the upper one -infinity, so that no ray meets it.
+    pub(crate) planes: [[f32; 8]; 6],
     /// Smaller boxes first.
     pub(crate) children: [u32; 8],
 }
 
-/// Up to eight triangles: coordinates by vertex and axis. Lanes that are not used hold NaN.
+impl Node {
+    pub(crate) const EMPTY: Self = {
+        let (low, high) = ([f32::INFINITY; 8], [f32::NEG_INFINITY; 8]);
+        Self { planes: [low, high, low, high, low, high], children: [Reference::NOTHING.0; 8] }
+    };
+
+    /// Which planes are the lower (0) or upper (1) ones of an axis.
+    #[inline(always)]
+    pub(crate) const fn row(axis: usize, side: usize) -> usize {
+        axis * 2 + side
+    }
+
+    /// Writes one child's box.
+    pub(crate) fn set_box(&mut self, child: usize, b: &Aabb<f32>) {
+        for axis in 0..3 {
+            self.planes[Self::row(axis, 0)][child] = b.min[axis];
+            self.planes[Self::row(axis, 1)][child] = b.max[axis];
+        }
+    }
+}
+
+/// Four triangles: coordinates by vertex and axis. Lanes that are not used hold NaN.
 #[derive(Clone, Copy, Debug)]
-#[repr(C, align(32))]
-pub(crate) struct Block(pub(crate) [[[f32; 8]; 3]; 3]);
+#[repr(C, align(16))]
+pub(crate) struct Block(pub(crate) [[[f32; 4]; 3]; 3]);
 
 impl Block {
+    const EMPTY: Self = Self([[[f32::NAN; 4]; 3]; 3]);
+
     #[inline(always)]
     pub(crate) fn triangle(&self, lane: usize) -> [Vec3; 3] {
-        let lane = lane & 7;
+        let lane = lane & 3;
         let [a, b, c] = &self.0;
         [
             Vec3::new(a[0][lane], a[1][lane], a[2][lane]),
@@ -74,17 +118,13 @@ impl Block {
     }
 }
 
-impl Block {
-    /// Lanes that are used.
-    pub(crate) fn count(&self) -> u32 {
-        self.0[0][0].iter().filter(|x| !x.is_nan()).count() as u32
-    }
-}
-
 /// Triangles in a leaf at most.
 const LEAF: u32 = 8;
-/// Cost of testing a block against that of a node.
-const BLOCK_COST: f32 = 1.0;
+
+/// Cost of testing a leaf against that of a node. Its triangles are tested at once, so it is the memory that counts.
+fn leaf_cost(count: u32) -> f32 {
+    if count <= 4 { 0.9 } else { 1.0 }
+}
 
 /// What the dynamic programme knows of a binary node: the least cost of showing what lies below as at most `i + 1`
 /// children, and how.
@@ -112,8 +152,14 @@ impl Wide8 {
         let mut tree =
             Self { root: Reference::NOTHING, nodes: Vec::new(), blocks: Vec::new(), depth: 0, sah_cost: 0.0 };
         let mut order = Vec::new();
+        // A leaf of one triangle may waste three lanes, but not all do.
+        tree.blocks.reserve(triangles.len() / 3);
+        tree.nodes.reserve(triangles.len() / 16);
         if let Some(root) = topology.root {
             tree.root = tree.emit(&collapse, root, triangles, 1, &mut order);
+            // Two blocks are read for any leaf.
+            tree.blocks.push(Block::EMPTY);
+            order.resize(tree.blocks.len() * 4, u32::MAX);
             let whole = f64::from(collapse.bounds(root).area());
             let plan = collapse.plan(root);
             tree.sah_cost = if whole > 0.0 { f64::from(plan.cost[0]) / whole } else { 1.0 };
@@ -121,7 +167,7 @@ impl Wide8 {
         (tree, order)
     }
 
-    /// Expected number of nodes and blocks that a random line through the root's box meets.
+    /// Expected number of nodes and leaves that a random line through the root's box meets.
     pub(crate) fn sah_cost(&self) -> f64 {
         self.sah_cost
     }
@@ -136,9 +182,10 @@ impl Wide8 {
         size_of_val(self.nodes.as_slice()) + size_of_val(self.blocks.as_slice())
     }
 
-    /// The triangle at a place, `8 * block + lane`.
+    /// The triangle at a place, `4 * block + lane`.
+    #[inline(always)]
     pub(crate) fn triangle(&self, place: usize) -> Option<[Vec3; 3]> {
-        self.blocks.get(place / 8).map(|b| b.triangle(place % 8))
+        self.blocks.get(place / 4).map(|b| b.triangle(place % 4))
     }
 
     /// Writes the subtree and says where it is. Recursion is as deep as the tree, which is bounded.
@@ -163,38 +210,35 @@ impl Wide8 {
         children.sort_by(|a, b| c.bounds(*a).area().total_cmp(&c.bounds(*b).area()));
 
         let index = self.nodes.len();
-        self.nodes.push(Node {
-            planes: [[[f32::INFINITY; 8], [f32::NEG_INFINITY; 8]]; 3],
-            children: [Reference::NOTHING.0; 8],
-        });
+        self.nodes.push(Node::EMPTY);
         for (k, child) in children.into_iter().enumerate() {
-            let b = c.bounds(child);
-            for axis in 0..3 {
-                self.nodes[index].planes[axis][0][k] = b.min[axis];
-                self.nodes[index].planes[axis][1][k] = b.max[axis];
-            }
+            self.nodes[index].set_box(k, &c.bounds(child));
             let reference = self.emit(c, child, triangles, depth + 1, order);
             self.nodes[index].children[k] = reference.0;
         }
         Reference::node(index)
     }
 
+    /// Appends up to eight triangles. `order` has as many entries as there are lanes in use.
     fn emit_leaf(&mut self, run: &[u32], triangles: &[[Vec3; 3]], order: &mut Vec<u32>) -> Reference {
-        let index = self.blocks.len();
-        let mut block = Block([[[f32::NAN; 8]; 3]; 3]);
-        for lane in 0..8 {
-            let primitive = run.get(lane).copied().unwrap_or(u32::MAX);
-            order.push(primitive);
-            if let Some(triangle) = triangles.get(primitive as usize) {
-                for (vertex, p) in triangle.iter().enumerate() {
-                    for axis in 0..3 {
-                        block.0[vertex][axis][lane] = p[axis];
-                    }
+        let room = if run.len() <= 4 { 4 } else { 8 };
+        if order.len() % 4 + run.len() > room {
+            order.resize(order.len().next_multiple_of(4), u32::MAX);
+        }
+        let first = order.len();
+        for &primitive in run {
+            let (block, lane) = (order.len() / 4, order.len() % 4);
+            if lane == 0 {
+                self.blocks.push(Block::EMPTY);
+            }
+            for (vertex, p) in triangles[primitive as usize].iter().enumerate() {
+                for axis in 0..3 {
+                    self.blocks[block].0[vertex][axis][lane] = p[axis];
                 }
             }
+            order.push(primitive);
         }
-        self.blocks.push(block);
-        Reference::block(index)
+        Reference::leaf(first, run.len())
     }
 }
 
@@ -234,7 +278,7 @@ impl<'a> Collapse<'a> {
 
     fn plan(&self, child: Child) -> Plan {
         if child.is_leaf() {
-            Plan { cost: [BLOCK_COST * self.bounds(child).area(); 8], left: [0; 8] }
+            Plan { cost: [leaf_cost(child.count) * self.bounds(child).area(); 8], left: [0; 8] }
         } else {
             self.plans[child.first as usize]
         }
@@ -251,7 +295,8 @@ impl<'a> Collapse<'a> {
         let area = self.boxes[node].area();
         let (below, left) = split(7);
         let inner = area + below;
-        let leaf = if self.counts[node] <= LEAF { BLOCK_COST * area } else { f32::INFINITY };
+        let count = self.counts[node];
+        let leaf = if count <= LEAF { leaf_cost(count) * area } else { f32::INFINITY };
         (plan.cost[0], plan.left[0]) = if leaf <= inner { (leaf, 0) } else { (inner, left) };
         for j in 1..8 {
             let (cost, left) = split(j);
@@ -292,6 +337,7 @@ mod tests {
         let mut seen: Vec<u32> = order.iter().copied().filter(|&p| p != u32::MAX).collect();
         seen.sort_unstable();
         assert_eq!(seen, (0..triangles.len() as u32).collect::<Vec<_>>(), "every triangle in one lane");
+        assert!(order.len() == tree.blocks.len() * 4);
         for (place, &p) in order.iter().enumerate() {
             let t = tree.triangle(place).unwrap();
             assert_eq!(triangles.get(p as usize).copied(), (!t[0].x.is_nan()).then_some(t));
@@ -299,15 +345,14 @@ mod tests {
         // Boxes of children hold what lies below.
         fn below(tree: &Wide8, order: &[u32], r: Reference) -> Aabb<f32> {
             if r.is_leaf() {
-                let places = r.index() * 8..r.index() * 8 + 8;
-                let used = places.filter(|&k| order[k] != u32::MAX);
+                let used = (0..8).filter(|k| r.lanes() >> k & 1 == 1).map(|k| r.block() * 4 + k);
                 return Aabb::from_points(used.flat_map(|k| tree.triangle(k).unwrap()));
             }
             let node = &tree.nodes[r.index()];
             let mut all = Aabb::empty();
             for k in (0..8).filter(|&k| node.children[k] != u32::MAX) {
-                let [x, y, z] = node.planes.map(|p| [p[0][k], p[1][k]]);
-                let b = Aabb::new(Vec3::new(x[0], y[0], z[0]), Vec3::new(x[1], y[1], z[1]));
+                let p = node.planes.map(|p| p[k]);
+                let b = Aabb::new(Vec3::new(p[0], p[2], p[4]), Vec3::new(p[1], p[3], p[5]));
                 assert_eq!(b, below(tree, order, Reference(node.children[k])));
                 all = all.union(b);
             }
@@ -318,7 +363,7 @@ mod tests {
         }
         if triangles.len() > 100 {
             let filled = triangles.len() as f64 / tree.blocks.len() as f64;
-            assert!(filled > 3.0, "blocks hold {filled} triangles");
+            assert!(filled > 3.0, "blocks hold {filled} triangles of 4");
         }
     }
 

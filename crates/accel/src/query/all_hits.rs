@@ -128,7 +128,7 @@ impl Scene {
         let hits = all.take.0;
         hits.sort_by(|a, b| self.order(ray, a, b));
         for hit in hits {
-            hit.normal = self.world_normal(hit);
+            *hit = self.finished(*hit);
         }
     }
 

@@ -21,16 +21,16 @@ pub use crossings::Crossings;
 
 use crate::{Hit, HitId};
 
-/// A hit that the collector may want. `normal` is a shape's, in its own space; triangles leave it zero.
+/// A hit that the collector may want. `normal` is in the instance's own space, and of any length.
 pub(crate) type Candidate = Hit;
 
 impl Candidate {
     #[inline(always)]
-    pub(crate) fn new(instance: u32, geometry: u32, primitive: u32, t: f64, u: f32, v: f32) -> Self {
+    pub(crate) fn new(id: HitId, t: f64, u: f32, v: f32, normal: DVec3) -> Self {
         // -0 becomes 0, so that lists which are sorted by bits agree with comparisons about what is equally near. What is
         // beyond the largest number is in no interval.
         let t = if t.is_finite() { t + 0.0 } else { f64::NAN };
-        Self { id: HitId { instance, geometry, primitive }, t, u, v, normal: DVec3::ZERO }
+        Self { id, t, u, v, normal }
     }
 }
 

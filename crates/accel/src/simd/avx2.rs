@@ -6,7 +6,7 @@
 
 use core::arch::x86_64::*;
 
-use super::{Lanes, Work};
+use super::{Lanes, Row, Work};
 
 /// Eight `f32`.
 #[derive(Clone, Copy)]
@@ -52,6 +52,21 @@ impl Lanes for Avx2 {
         unsafe { Self(_mm256_loadu_ps(x.as_ptr())) }
     }
     #[inline(always)]
+    fn load_row(rows: &[[f32; 8]; 6], row: Row) -> Self {
+        // SAFETY: a `Row` is the start of one of six times eight numbers.
+        unsafe { Self(_mm256_loadu_ps(rows.as_ptr().cast::<f32>().add(row.0))) }
+    }
+    #[inline(always)]
+    fn load_halves(low: &[f32; 4], high: &[f32; 4]) -> Self {
+        unsafe { Self(_mm256_set_m128(_mm_loadu_ps(high.as_ptr()), _mm_loadu_ps(low.as_ptr()))) }
+    }
+    #[inline(always)]
+    fn store(self) -> [f32; 8] {
+        let mut out = [0.0; 8];
+        unsafe { _mm256_storeu_ps(out.as_mut_ptr(), self.0) };
+        out
+    }
+    #[inline(always)]
     fn add(self, o: Self) -> Self {
         unsafe { Self(_mm256_add_ps(self.0, o.0)) }
     }
@@ -84,6 +99,14 @@ impl Lanes for Avx2 {
         unsafe { Self(_mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0)) }
     }
     #[inline(always)]
+    fn turned_by(self, o: Self) -> Self {
+        unsafe { Self(_mm256_xor_ps(self.0, _mm256_and_ps(_mm256_set1_ps(-0.0), o.0))) }
+    }
+    #[inline(always)]
+    fn negative(self) -> u32 {
+        unsafe { _mm256_movemask_ps(self.0) as u32 }
+    }
+    #[inline(always)]
     fn le(self, o: Self) -> u32 {
         unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, o.0)) as u32 }
     }
@@ -98,6 +121,16 @@ impl Lanes for Avx2 {
             let (even, odd) = (_mm256_unpacklo_epi32(low, high), _mm256_unpackhi_epi32(low, high));
             _mm256_storeu_si256(out.as_mut_ptr().cast(), _mm256_permute2x128_si256::<0x20>(even, odd));
             _mm256_storeu_si256(out.as_mut_ptr().add(4).cast(), _mm256_permute2x128_si256::<0x31>(even, odd));
+        }
+        out
+    }
+    #[inline(always)]
+    fn pack_words(words: &[u32; 8], mask: u32) -> [u32; 8] {
+        let mut out = [0u32; 8];
+        unsafe {
+            let lanes = _mm256_cvtepu8_epi32(_mm_loadl_epi64(LANES[mask as usize & 255].as_ptr().cast()));
+            let packed = _mm256_permutevar8x32_epi32(_mm256_loadu_si256(words.as_ptr().cast()), lanes);
+            _mm256_storeu_si256(out.as_mut_ptr().cast(), packed);
         }
         out
     }

@@ -6,6 +6,8 @@
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
 mod portable;
 mod stack;
 
@@ -22,13 +24,15 @@ pub enum Level {
     /// What every processor has; the compiler does with it what it can.
     Scalar,
     /// AVX2, FMA and BMI2 of x86-64.
-    #[default]
     Avx2,
+    /// The same and AVX-512 F and VL: registers of the same width, but twice as many.
+    #[default]
+    Avx512,
 }
 
 impl Level {
     /// Every level, from the least demanding.
-    pub const ALL: [Self; 2] = [Self::Scalar, Self::Avx2];
+    pub const ALL: [Self; 3] = [Self::Scalar, Self::Avx2, Self::Avx512];
 
     /// Whether this processor has it.
     #[must_use]
@@ -44,8 +48,12 @@ impl Level {
                     && is_x86_feature_detected!("lzcnt")
                     && is_x86_feature_detected!("popcnt")
             }
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => {
+                Self::Avx2.is_available() && is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl")
+            }
             #[cfg(not(target_arch = "x86_64"))]
-            Self::Avx2 => false,
+            Self::Avx2 | Self::Avx512 => false,
         }
     }
 
@@ -55,6 +63,7 @@ impl Level {
         match self {
             Self::Scalar => "scalar",
             Self::Avx2 => "avx2",
+            Self::Avx512 => "avx512",
         }
     }
 }
@@ -72,7 +81,7 @@ impl core::str::FromStr for Level {
         Self::ALL
             .into_iter()
             .find(|l| l.name() == s)
-            .ok_or_else(|| format!("unknown SIMD level '{s}' (scalar or avx2)"))
+            .ok_or_else(|| format!("unknown SIMD level '{s}' (scalar, avx2 or avx512)"))
     }
 }
 
@@ -80,6 +89,11 @@ impl core::str::FromStr for Level {
 pub(crate) trait Lanes: Copy {
     fn splat(x: f32) -> Self;
     fn load(x: &[f32; 8]) -> Self;
+    /// One of the rows.
+    fn load_row(rows: &[[f32; 8]; 6], row: Row) -> Self;
+    /// The lower four lanes from one place, the upper four from another.
+    fn load_halves(low: &[f32; 4], high: &[f32; 4]) -> Self;
+    fn store(self) -> [f32; 8];
     fn add(self, o: Self) -> Self;
     fn sub(self, o: Self) -> Self;
     fn mul(self, o: Self) -> Self;
@@ -91,11 +105,31 @@ pub(crate) trait Lanes: Copy {
     /// The larger; `o` where one is NaN.
     fn max(self, o: Self) -> Self;
     fn abs(self) -> Self;
+    /// With the sign turned where that of `o` is negative.
+    fn turned_by(self, o: Self) -> Self;
+    /// Lanes whose sign is negative, -0 too.
+    fn negative(self) -> u32;
     /// Lanes where `self <= o`.
     fn le(self, o: Self) -> u32;
     /// For each lane in the mask, from the lowest, `bits(self) << 32 | words`. Returns them all at the front of eight;
     /// what follows is of no use.
     fn pack(self, words: &[u32; 8], mask: u32) -> [u64; 8];
+    /// The words of the lanes in the mask alone.
+    fn pack_words(words: &[u32; 8], mask: u32) -> [u32; 8];
+}
+
+/// The index of one row of six.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Row(usize);
+
+impl Row {
+    /// # Panics
+    /// If there is no such row.
+    #[inline(always)]
+    pub(crate) fn new(row: usize) -> Self {
+        assert!(row < 6);
+        Self(row * 8)
+    }
 }
 
 /// Work that is written once for all levels.
@@ -112,7 +146,8 @@ pub(crate) struct Available(Level);
 impl Available {
     /// The level wished for, or the best there is below it.
     pub(crate) fn up_to(level: Level) -> Self {
-        Self(if level.is_available() { level } else { Level::Scalar })
+        let below = Level::ALL.into_iter().rev().skip_while(|&l| l != level);
+        Self(below.into_iter().find(|l| l.is_available()).unwrap_or(Level::Scalar))
     }
 }
 
@@ -123,6 +158,9 @@ pub(crate) fn run<W: Work>(level: Available, work: W) -> W::Output {
         // SAFETY: an `Available` is made only of levels that the processor has.
         #[cfg(target_arch = "x86_64")]
         Level::Avx2 => unsafe { avx2::run(work) },
+        // SAFETY: as above.
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx512 => unsafe { avx512::run(work) },
         _ => work.run::<Portable>(),
     }
 }

@@ -1,6 +1,6 @@
 //! Eight lanes in plain Rust.
 
-use super::Lanes;
+use super::{Lanes, Row};
 
 /// An array: what the compiler makes of it depends on the target.
 #[derive(Clone, Copy, Debug)]
@@ -26,6 +26,19 @@ impl Lanes for Portable {
     #[inline(always)]
     fn load(x: &[f32; 8]) -> Self {
         Self(*x)
+    }
+    #[inline(always)]
+    fn load_row(rows: &[[f32; 8]; 6], row: Row) -> Self {
+        Self(rows[row.0 / 8])
+    }
+    #[inline(always)]
+    fn load_halves(low: &[f32; 4], high: &[f32; 4]) -> Self {
+        let ([a, b, c, d], [e, f, g, h]) = (*low, *high);
+        Self([a, b, c, d, e, f, g, h])
+    }
+    #[inline(always)]
+    fn store(self) -> [f32; 8] {
+        self.0
     }
     #[inline(always)]
     fn add(self, o: Self) -> Self {
@@ -60,6 +73,18 @@ impl Lanes for Portable {
         self.zip(self, |a, _| a.abs())
     }
     #[inline(always)]
+    fn turned_by(self, o: Self) -> Self {
+        self.zip(o, |a, b| f32::from_bits(a.to_bits() ^ (b.to_bits() & 1 << 31)))
+    }
+    #[inline(always)]
+    fn negative(self) -> u32 {
+        let mut mask = 0;
+        for k in 0..8 {
+            mask |= (self.0[k].to_bits() >> 31) << k;
+        }
+        mask
+    }
+    #[inline(always)]
     fn le(self, o: Self) -> u32 {
         let mut mask = 0;
         for k in 0..8 {
@@ -74,6 +99,17 @@ impl Lanes for Portable {
         while mask != 0 {
             let k = mask.trailing_zeros() as usize & 7;
             out[n & 7] = u64::from(self.0[k].to_bits()) << 32 | u64::from(words[k]);
+            n += 1;
+            mask &= mask - 1;
+        }
+        out
+    }
+    #[inline(always)]
+    fn pack_words(words: &[u32; 8], mut mask: u32) -> [u32; 8] {
+        let mut out = [0; 8];
+        let mut n = 0;
+        while mask != 0 {
+            out[n & 7] = words[mask.trailing_zeros() as usize & 7];
             n += 1;
             mask &= mask - 1;
         }

@@ -3,19 +3,18 @@
 use core::mem::MaybeUninit;
 
 use crate::build::MAX_DEPTH;
-use crate::stats::Probe;
 
 /// Each level of a tree leaves at most seven children behind, and eight are written at once.
 const SIZE: usize = 7 * MAX_DEPTH as usize + 8;
 
-/// A stack of keys, distance above and child below. It lives on the machine's stack and is not cleared first: that
+/// A stack of children, or of keys with the distance above and the child below. It lives on the machine's stack and is not cleared first: that
 /// would cost as much as a short ray.
-pub(crate) struct Stack {
-    entries: [MaybeUninit<u64>; SIZE],
+pub(crate) struct Stack<T> {
+    entries: [MaybeUninit<T>; SIZE],
     len: usize,
 }
 
-impl Stack {
+impl<T: Copy> Stack<T> {
     #[inline(always)]
     pub(crate) fn new() -> Self {
         Self { entries: [const { MaybeUninit::uninit() }; SIZE], len: 0 }
@@ -26,7 +25,7 @@ impl Stack {
     /// # Panics
     /// If the stack is full, which no tree of bounded depth brings about.
     #[inline(always)]
-    pub(crate) fn push(&mut self, keys: &[u64; 8], n: usize) {
+    pub(crate) fn push(&mut self, keys: &[T; 8], n: usize) {
         assert!(self.len + 8 <= SIZE && n <= 8, "trees are not so deep");
         for (slot, key) in self.entries[self.len..self.len + 8].iter_mut().zip(keys) {
             slot.write(*key);
@@ -34,44 +33,53 @@ impl Stack {
         self.len += n;
     }
 
+    #[inline(always)]
+    pub(crate) fn pop(&mut self) -> Option<T> {
+        self.len = self.len.checked_sub(1)?;
+        // SAFETY: every entry below `len` was written by `push`, and `len` is below SIZE.
+        Some(unsafe { self.entries.get_unchecked(self.len).assume_init() })
+    }
+}
+
+impl Stack<u64> {
     /// Sorts the first `n` (2 to 8) of these keys, puts all but the smallest on top, smaller ones above, and returns the
-    /// smallest. Few keys, nearly always, are sorted without a detour through memory.
+    /// smallest (the other way round if `reversed`). Few keys, nearly always, are sorted without a detour through memory.
     ///
     /// # Panics
     /// As [`Stack::push`].
     #[inline(always)]
-    pub(crate) fn push_all_but_nearest<P: Probe>(&mut self, mut keys: [u64; 8], n: usize) -> u64 {
-        if P::REVERSED {
+    pub(crate) fn push_all_but_nearest(&mut self, mut keys: [u64; 8], n: usize, reversed: bool) -> u64 {
+        if reversed {
             keys[..n.min(8)].iter_mut().for_each(|k| *k = !*k);
         }
         let [a, b, c, d, ..] = keys;
         let nearest = match n {
             2 => {
                 let (a, b) = order(a, b);
-                self.put::<P, 1>([b]);
+                self.put([b], reversed);
                 a
             }
             3 => {
                 let (a, b) = order(a, b);
                 let (b, c) = order(b, c);
                 let (a, b) = order(a, b);
-                self.put::<P, 2>([c, b]);
+                self.put([c, b], reversed);
                 a
             }
             4 => {
                 let ((a, b), (c, d)) = (order(a, b), order(c, d));
                 let ((a, c), (b, d)) = (order(a, c), order(b, d));
                 let (b, c) = order(b, c);
-                self.put::<P, 3>([d, c, b]);
+                self.put([d, c, b], reversed);
                 a
             }
-            _ => self.push_many::<P>(keys, n),
+            _ => self.push_many(keys, n, reversed),
         };
-        if P::REVERSED { !nearest } else { nearest }
+        if reversed { !nearest } else { nearest }
     }
 
     #[inline(never)]
-    fn push_many<P: Probe>(&mut self, mut keys: [u64; 8], n: usize) -> u64 {
+    fn push_many(&mut self, mut keys: [u64; 8], n: usize, reversed: bool) -> u64 {
         let keys = &mut keys[..n.min(8)];
         for i in 1..keys.len() {
             let key = keys[i];
@@ -83,24 +91,17 @@ impl Stack {
             keys[k] = key;
         }
         let Some((nearest, rest)) = keys.split_last() else { return 0 };
-        rest.iter().for_each(|k| self.put::<P, 1>([*k]));
+        rest.iter().for_each(|k| self.put([*k], reversed));
         *nearest
     }
 
     #[inline(always)]
-    fn put<P: Probe, const N: usize>(&mut self, keys: [u64; N]) {
+    fn put<const N: usize>(&mut self, keys: [u64; N], reversed: bool) {
         assert!(self.len + N <= SIZE, "trees are not so deep");
         for (slot, key) in self.entries[self.len..self.len + N].iter_mut().zip(keys) {
-            slot.write(if P::REVERSED { !key } else { key });
+            slot.write(if reversed { !key } else { key });
         }
         self.len += N;
-    }
-
-    #[inline(always)]
-    pub(crate) fn pop(&mut self) -> Option<u64> {
-        self.len = self.len.checked_sub(1)?;
-        // SAFETY: every entry below `len` was written by `push`, and `len` is below SIZE.
-        Some(unsafe { self.entries.get_unchecked(self.len).assume_init() })
     }
 }
 
@@ -113,7 +114,6 @@ fn order(a: u64, b: u64) -> (u64, u64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stats::{FarFirst, Off};
     use proptest::prelude::*;
 
     proptest! {
@@ -122,10 +122,10 @@ mod tests {
             let mut sorted = keys[..n].to_vec();
             sorted.sort_unstable();
             let mut stack = Stack::new();
-            let mut got = vec![stack.push_all_but_nearest::<Off>(keys, n)];
+            let mut got = vec![stack.push_all_but_nearest(keys, n, false)];
             got.extend(core::iter::from_fn(|| stack.pop()));
             prop_assert_eq!(&got, &sorted);
-            got = vec![stack.push_all_but_nearest::<FarFirst>(keys, n)];
+            got = vec![stack.push_all_but_nearest(keys, n, true)];
             got.extend(core::iter::from_fn(|| stack.pop()));
             sorted.reverse();
             prop_assert_eq!(&got, &sorted);

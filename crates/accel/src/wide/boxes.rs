@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use crate::layout::wide8::Node;
-use crate::simd::Lanes;
+use crate::simd::{Lanes, Row};
 
 /// Reciprocals are kept finite, so that no product is NaN: a direction component smaller than this bends the ray by
 /// less than the slack in the boxes' padding.
@@ -11,79 +11,84 @@ const SMALLEST: f32 = 1e-18;
 
 /// A ray for the test of eight boxes: `plane * inverse - origin * inverse`, which is one instruction.
 ///
-/// Its error, against the exact reciprocal: the product with the origin is rounded (`u |o|` in the plane's place, which
-/// whoever widens the origins must cover), and two more roundings are relative to the result.
+/// Its error, against the exact reciprocal: the product with the origin is rounded (`u |o|` in the plane's place), and
+/// two more roundings are relative to the result (`2u |plane - o|`). Whoever widens the boxes must cover them.
 #[derive(Clone, Copy)]
 pub(crate) struct Boxes<L> {
-    near: [Ends<L>; 3],
-    far: [Ends<L>; 3],
-    /// Added to the far ends, relative to them, for lines that begin before 0; others have it in `far`.
-    line: Option<L>,
+    axes: [Axis<L>; 3],
 }
 
-/// Planes of one axis and one side.
+/// The planes of one axis.
 #[derive(Clone, Copy)]
-struct Ends<L> {
-    /// Lower (0) or upper (1).
-    side: usize,
+struct Axis<L> {
+    /// The planes where the ray enters, and where it leaves.
+    entry: Row,
+    exit: Row,
     inverse: L,
-    /// The origin times the reciprocal.
-    origin: L,
+    /// The origin times the reciprocal, for either.
+    near: L,
+    far: L,
 }
 
-impl<L: Lanes> Ends<L> {
+impl<L: Lanes> Axis<L> {
     #[inline(always)]
-    fn new(side: usize, inverse: f32, origin: f32) -> Self {
-        Self { side, inverse: L::splat(inverse), origin: L::splat(origin * inverse) }
+    fn enter(&self, node: &Node) -> L {
+        L::load_row(&node.planes, self.entry).mul_sub(self.inverse, self.near)
     }
 
     #[inline(always)]
-    fn at(&self, planes: &[[f32; 8]; 2]) -> L {
-        L::load(&planes[self.side & 1]).mul_sub(self.inverse, self.origin)
+    fn leave(&self, node: &Node) -> L {
+        L::load_row(&node.planes, self.exit).mul_sub(self.inverse, self.far)
     }
 }
-
-/// 4 roundings of an end (two here, two to spare), twice: on either side.
-const PAD: f32 = 8.0 * f32::EPSILON / 2.0;
 
 impl<L: Lanes> Boxes<L> {
-    /// For boxes that are to be met as if larger by `delta` in each axis, and by the roundings of the test.
+    /// For boxes that are to be met as if larger by `delta` in each axis.
     #[inline(always)]
-    pub(crate) fn new(origin: Vec3, direction: Vec3, delta: Vec3, padded: bool, t_min: f32) -> Self {
-        let pad = if padded { PAD } else { 0.0 };
-        // A longer reciprocal moves positive ends outward, and costs nothing.
-        let line = t_min < 0.0;
-        let far = if line { 1.0 } else { 1.0 + pad };
-        let (x0, x1) = axis(origin.x, direction.x, delta.x, far);
-        let (y0, y1) = axis(origin.y, direction.y, delta.y, far);
-        let (z0, z1) = axis(origin.z, direction.z, delta.z, far);
-        Self { near: [x0, y0, z0], far: [x1, y1, z1], line: line.then(|| L::splat(pad)) }
+    pub(crate) fn new(origin: Vec3, direction: Vec3, delta: f32) -> Self {
+        // All axes at once; the other lanes are of no use.
+        let origin = L::load(&[origin.x, origin.y, origin.z, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        let direction = L::load(&[direction.x, direction.y, direction.z, 1.0, 1.0, 1.0, 1.0, 1.0]);
+        let inverse = L::splat(1.0).div(direction.abs().max(L::splat(SMALLEST)).turned_by(direction));
+        let out = L::splat(delta).turned_by(direction);
+        let (near, far) = (origin.add(out).mul(inverse).store(), origin.sub(out).mul(inverse).store());
+        let (inverse, negative) = (inverse.store(), direction.negative() as usize);
+        // Going down, the ray enters through the upper planes.
+        let side = [negative & 1, negative >> 1 & 1, negative >> 2 & 1];
+        let axis = AxisOf { inverse: &inverse, near: &near, far: &far, side: &side };
+        Self { axes: [axis.of(0), axis.of(1), axis.of(2)] }
     }
 
     /// Which children the ray meets within `[t_min, t_max]`, and where it enters them.
     #[inline(always)]
     pub(crate) fn test(&self, node: &Node, t_min: L, t_max: L) -> (u32, L) {
-        let [x, y, z] = &node.planes;
-        let enter = self.near[0].at(x).max(self.near[1].at(y)).max(self.near[2].at(z).max(t_min));
-        let mut leave = self.far[0].at(x).min(self.far[1].at(y)).min(self.far[2].at(z));
-        if let Some(pad) = self.line {
-            // Of a missing child the far end is -infinity, and padded NaN: as the second operand below it stays, and is
-            // no hit.
-            leave = leave.add(leave.abs().mul(pad));
-        }
-        (enter.le(t_max.min(leave)), enter)
+        let [x, y, z] = &self.axes;
+        let enter = x.enter(node).max(y.enter(node)).max(z.enter(node).max(t_min));
+        let leave = x.leave(node).min(y.leave(node)).min(z.leave(node).min(t_max));
+        (enter.le(leave), enter)
     }
 }
 
-/// The nearer and the farther planes of one axis.
-#[inline(always)]
-fn axis<L: Lanes>(origin: f32, direction: f32, delta: f32, far: f32) -> (Ends<L>, Ends<L>) {
-    let direction = if direction.abs() < SMALLEST { SMALLEST.copysign(direction) } else { direction };
-    let inverse = 1.0 / direction;
-    let out = delta.copysign(direction);
-    // Going down, the ray enters through the upper planes.
-    let side = (direction.to_bits() >> 31) as usize;
-    (Ends::new(side, inverse, origin + out), Ends::new(1 - side, inverse * far, origin - out))
+/// What one [`Axis`] is made of. (A closure could not be told to be inlined.)
+struct AxisOf<'a> {
+    inverse: &'a [f32; 8],
+    near: &'a [f32; 8],
+    far: &'a [f32; 8],
+    side: &'a [usize; 3],
+}
+
+impl AxisOf<'_> {
+    #[inline(always)]
+    fn of<L: Lanes>(&self, k: usize) -> Axis<L> {
+        let side = self.side[k];
+        Axis {
+            entry: Row::new(Node::row(k, side)),
+            exit: Row::new(Node::row(k, 1 - side)),
+            inverse: L::splat(self.inverse[k]),
+            near: L::splat(self.near[k]),
+            far: L::splat(self.far[k]),
+        }
+    }
 }
 
 #[cfg(test)]
@@ -105,20 +110,16 @@ mod tests {
         type Output = u32;
         #[inline(always)]
         fn run<L: Lanes>(self) -> u32 {
-            let delta = if self.padded { self.origin.abs() * 3e-7 + 1e-12 } else { Vec3::ZERO };
-            let boxes = Boxes::<L>::new(self.origin, self.direction, delta, self.padded, self.t_min);
+            // 4u|o|, and 4u of the farthest that a plane may be.
+            let delta = if self.padded { (self.origin.abs().max_element() + 50.0) * 2.4e-7 } else { 0.0 };
+            let boxes = Boxes::<L>::new(self.origin, self.direction, delta);
             boxes.test(self.node, L::splat(self.t_min), L::splat(f32::INFINITY)).0
         }
     }
 
     fn node(boxes: &[Aabb<f32>]) -> Node {
-        let mut node = Node { planes: [[[f32::INFINITY; 8], [f32::NEG_INFINITY; 8]]; 3], children: [u32::MAX; 8] };
-        for (k, b) in boxes.iter().enumerate() {
-            for axis in 0..3 {
-                node.planes[axis][0][k] = b.min[axis];
-                node.planes[axis][1][k] = b.max[axis];
-            }
-        }
+        let mut node = Node::EMPTY;
+        boxes.iter().enumerate().for_each(|(k, b)| node.set_box(k, b));
         node
     }
 

@@ -8,6 +8,7 @@ use core::ops::ControlFlow;
 use glam::Vec3;
 
 pub(crate) use boxes::Boxes;
+use triangles::Leaf;
 pub(crate) use triangles::{Either, Filter, Margin, Plain, Sheared};
 
 use crate::layout::wide8::{Reference, Wide8};
@@ -20,9 +21,7 @@ pub(crate) struct BoxRay {
     pub(crate) origin: Vec3,
     pub(crate) direction: Vec3,
     /// Boxes are met as if larger by this in each axis.
-    pub(crate) delta: Vec3,
-    /// And by the roundings of their test.
-    pub(crate) padded: bool,
+    pub(crate) delta: f32,
     pub(crate) t_min: f32,
     pub(crate) t_max: f32,
 }
@@ -30,9 +29,15 @@ pub(crate) struct BoxRay {
 /// Tests triangles. A trait and not a closure, which could not be told to be inlined: into what is compiled for the
 /// level, or every call would save and load all registers.
 pub(crate) trait Visit<P> {
-    /// Gets a triangle's place and vertices. Answers with the new end of the interval if it has become shorter, or
+    /// Gets a triangle's place and vertices, and what the filter knows of it. Answers with the new end of the interval if it has become shorter, or
     /// breaks. Must be `#[inline(always)]`.
-    fn visit(&mut self, place: usize, triangle: &[Vec3; 3], probe: &mut P) -> ControlFlow<(), Option<f32>>;
+    fn visit(
+        &mut self,
+        place: usize,
+        triangle: &[Vec3; 3],
+        known: [f32; 3],
+        probe: &mut P,
+    ) -> ControlFlow<(), Option<f32>>;
 }
 
 /// Visits what the ray meets: nearer boxes first if `ORDERED`, else larger ones.
@@ -50,18 +55,20 @@ pub(crate) fn traverse<L: Lanes, F: Filter<L>, P: Probe, const ORDERED: bool>(
     if tree.root == Reference::NOTHING {
         return ControlFlow::Continue(());
     }
-    let boxes = Boxes::<L>::new(ray.origin, ray.direction, ray.delta, ray.padded, ray.t_min);
+    let boxes = Boxes::<L>::new(ray.origin, ray.direction, ray.delta);
     let t_min = L::splat(ray.t_min);
     let mut t_max = ray.t_max;
     let mut ends = L::splat(t_max);
-    let mut stack = Stack::new();
+    let mut interval = filter.interval(ray.t_min, t_max);
+    // Nearest first, or without distances.
+    let (mut keys, mut children) = (Stack::<u64>::new(), Stack::<u32>::new());
     let mut current = tree.root;
     loop {
         while !current.is_leaf() {
             let node = &tree.nodes[current.index()];
             let (mut hits, enter) = boxes.test(node, t_min, ends);
             probe.boxes(8);
-            if !P::PRUNE {
+            if !probe.prunes() {
                 hits = node.children.iter().enumerate().fold(0, |m, (k, &c)| m | u32::from(c != u32::MAX) << k);
             }
             if hits == 0 {
@@ -75,33 +82,47 @@ pub(crate) fn traverse<L: Lanes, F: Filter<L>, P: Probe, const ORDERED: bool>(
             if ORDERED {
                 // Keys are ordered by the bits of distances, which must not be negative; what begins before 0 is all
                 // alike, and never beyond the end.
-                let keys = enter.max(L::splat(0.0)).pack(&node.children, hits);
-                current = Reference(stack.push_all_but_nearest::<P>(keys, hits.count_ones() as usize) as u32);
+                let hit = enter.max(L::splat(0.0)).pack(&node.children, hits);
+                current =
+                    Reference(keys.push_all_but_nearest(hit, hits.count_ones() as usize, probe.reversed()) as u32);
             } else {
                 // The largest is the last.
                 let last = 31 - hits.leading_zeros();
                 current = Reference(node.children[last as usize & 7]);
                 let rest = hits ^ 1 << last;
-                stack.push(&enter.pack(&node.children, rest), rest.count_ones() as usize);
+                children.push(&L::pack_words(&node.children, rest), rest.count_ones() as usize);
             }
         }
         if current != Reference::NOTHING {
-            let index = current.index();
-            let block = &tree.blocks[index];
-            let mut lanes = filter.candidates(block, t_min, ends);
-            probe.block(|| block.count());
-            while lanes != 0 {
-                let lane = lanes.trailing_zeros() as usize;
-                lanes &= lanes - 1;
-                if let Some(end) = visitor.visit(index * 8 + lane, &block.triangle(lane), probe)? {
-                    t_max = end;
-                    ends = L::splat(end);
+            let (index, lanes) = (current.block(), current.lanes());
+            probe.primitives(lanes.count_ones());
+            // Where one block is enough, no other is fetched.
+            let high = index + usize::from(lanes > 0xf);
+            let leaf = Leaf { low: &tree.blocks[index], high: &tree.blocks[high], lanes };
+            let (mut candidates, known) = filter.candidates(&leaf, &interval);
+            if candidates != 0 {
+                let known = [known[0].store(), known[1].store(), known[2].store()];
+                while candidates != 0 {
+                    let lane = candidates.trailing_zeros() as usize & 7;
+                    candidates &= candidates - 1;
+                    let triangle = tree.blocks[index + lane / 4].triangle(lane);
+                    let known = [known[0][lane], known[1][lane], known[2][lane]];
+                    if let Some(end) = visitor.visit(index * 4 + lane, &triangle, known, probe)? {
+                        t_max = end;
+                        ends = L::splat(end);
+                        interval = filter.interval(ray.t_min, end);
+                    }
                 }
             }
         }
+        if !ORDERED {
+            let Some(child) = children.pop() else { return ControlFlow::Continue(()) };
+            current = Reference(child);
+            continue;
+        }
         loop {
-            let Some(key) = stack.pop() else { return ControlFlow::Continue(()) };
-            if !ORDERED || !P::PRUNE || f32::from_bits((key >> 32) as u32) <= t_max.max(0.0) {
+            let Some(key) = keys.pop() else { return ControlFlow::Continue(()) };
+            if !probe.prunes() || f32::from_bits((key >> 32) as u32) <= t_max.max(0.0) {
                 current = Reference(key as u32);
                 break;
             }

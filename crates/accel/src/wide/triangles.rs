@@ -7,17 +7,45 @@
 use firsthit_geometry::triangle::Shear;
 use glam::Vec3;
 
+use crate::Guards;
+use crate::guards::GuardSet;
 use crate::layout::wide8::Block;
 use crate::simd::Lanes;
 
 /// Eight vectors.
 type Vectors<L> = [L; 3];
 
-/// A filter of blocks for one ray.
+/// Triangles of a leaf: those of two blocks, of which some lanes count.
+#[derive(Clone, Copy)]
+pub(crate) struct Leaf<'a> {
+    pub(crate) low: &'a Block,
+    pub(crate) high: &'a Block,
+    pub(crate) lanes: u32,
+}
+
+impl Leaf<'_> {
+    #[inline(always)]
+    fn load<L: Lanes>(&self, vertex: usize, axis: usize) -> L {
+        L::load_halves(&self.low.0[vertex][axis], &self.high.0[vertex][axis])
+    }
+
+    #[inline(always)]
+    fn vertex<L: Lanes>(&self, vertex: usize) -> Vectors<L> {
+        [self.load(vertex, 0), self.load(vertex, 1), self.load(vertex, 2)]
+    }
+}
+
+/// What a filter knows of the triangles: edge functions, or `t`, `u` and `v`.
+pub(crate) type Known<L> = [L; 3];
+
+/// A filter of leaves for one ray.
 pub(crate) trait Filter<L: Lanes>: Copy {
-    /// One bit for each lane that may be hit in `[t_min, t_max]` (of the boxes' interval, which has room for rounding);
-    /// none for lanes that are not used.
-    fn candidates(&self, block: &Block, t_min: L, t_max: L) -> u32;
+    /// The ray's interval, prepared.
+    type Interval: Copy;
+    /// The boxes' interval, which has room for rounding.
+    fn interval(&self, t_min: f32, t_max: f32) -> Self::Interval;
+    /// One bit for each lane of the leaf that may be hit in the interval.
+    fn candidates(&self, leaf: &Leaf<'_>, interval: &Self::Interval) -> (u32, Known<L>);
 }
 
 /// The operations of the watertight test in `f32`, as [`Shear::weights`] does them: the same decision, but for edge
@@ -30,10 +58,10 @@ pub(crate) struct Sheared<L> {
     axes: [usize; 3],
     shear: [L; 2],
     /// How far a sheared coordinate may be off the true ray's, where the decision is to be made for that.
-    off: L,
+    off: f32,
     /// The direction's component along the last axis, and how far a vertex may be off along it.
-    depth: L,
-    slack: L,
+    depth: f32,
+    slack: f32,
 }
 
 /// Edge functions, the larger coordinate of all corners, and the range of depths.
@@ -48,30 +76,33 @@ impl<L: Lanes> Sheared<L> {
     #[inline(always)]
     pub(crate) fn new(origin: Vec3, direction: Vec3, shear: &Shear<f32>, off: f32, slack: f32) -> Self {
         let axis = shear.axis();
-        let (x, y) = shear.slopes();
-        let axes = [(axis + 1) % 3, (axis + 2) % 3, axis % 3];
+        let slopes = shear.slopes();
+        // Looked up in memory: no branches on what is not to be predicted.
+        const NEXT: [[usize; 3]; 4] = [[1, 2, 0], [2, 0, 1], [0, 1, 2], [0, 1, 2]];
+        let axes = NEXT[axis & 3];
+        let [x, y, z] = axes;
+        let (o, direction) = ([origin.x, origin.y, origin.z, 0.0], [direction.x, direction.y, direction.z, 0.0]);
         Self {
-            origin: [L::splat(origin[axes[0]]), L::splat(origin[axes[1]]), L::splat(origin[axes[2]])],
+            origin: [L::splat(o[x & 3]), L::splat(o[y & 3]), L::splat(o[z & 3])],
             axes,
-            shear: [L::splat(x), L::splat(y)],
-            off: L::splat(off),
-            depth: L::splat(direction[axes[2]]),
-            slack: L::splat(slack),
+            shear: [L::splat(slopes.0), L::splat(slopes.1)],
+            off,
+            depth: direction[axes[2] & 3],
+            slack,
         }
     }
 
     #[inline(always)]
-    fn corner(&self, block: &Block, vertex: usize) -> [L; 3] {
-        let v = &block.0[vertex];
-        let x = L::load(&v[self.axes[0]]).sub(self.origin[0]);
-        let y = L::load(&v[self.axes[1]]).sub(self.origin[1]);
-        let z = L::load(&v[self.axes[2]]).sub(self.origin[2]);
+    fn corner(&self, leaf: &Leaf<'_>, vertex: usize) -> [L; 3] {
+        let x = leaf.load::<L>(vertex, self.axes[0]).sub(self.origin[0]);
+        let y = leaf.load::<L>(vertex, self.axes[1]).sub(self.origin[1]);
+        let z = leaf.load::<L>(vertex, self.axes[2]).sub(self.origin[2]);
         [x.sub(self.shear[0].mul(z)), y.sub(self.shear[1].mul(z)), z]
     }
 
     #[inline(always)]
-    fn project(&self, block: &Block) -> Projected<L> {
-        let [a, b, c] = [self.corner(block, 0), self.corner(block, 1), self.corner(block, 2)];
+    fn project(&self, leaf: &Leaf<'_>) -> Projected<L> {
+        let [a, b, c] = [self.corner(leaf, 0), self.corner(leaf, 1), self.corner(leaf, 2)];
         Projected {
             edges: [edge(c, b), edge(a, c), edge(b, a)],
             size: size(a).max(size(b)).max(size(c)),
@@ -80,13 +111,20 @@ impl<L: Lanes> Sheared<L> {
         }
     }
 
+    /// Depths in the interval.
+    #[inline(always)]
+    fn depths(&self, t_min: f32, t_max: f32) -> [L; 2] {
+        let (first, last) = (t_min * self.depth, t_max * self.depth);
+        let (low, high) = if self.depth < 0.0 { (last, first) } else { (first, last) };
+        [L::splat(low - self.slack), L::splat(high + self.slack)]
+    }
+}
+
+impl<L: Lanes> Projected<L> {
     /// Lanes whose triangles reach into the interval: their depths tell, whatever the weights.
     #[inline(always)]
-    fn within(&self, p: &Projected<L>, t_min: L, t_max: L) -> u32 {
-        let (first, last) = (t_min.mul(self.depth), t_max.mul(self.depth));
-        let low = first.min(last).sub(self.slack);
-        let high = first.max(last).add(self.slack);
-        p.nearest.le(high) & low.le(p.farthest)
+    fn within(&self, [low, high]: &[L; 2]) -> u32 {
+        self.nearest.le(*high) & low.le(self.farthest)
     }
 }
 
@@ -102,13 +140,20 @@ fn size<L: Lanes>(p: [L; 3]) -> L {
 }
 
 impl<L: Lanes> Filter<L> for Sheared<L> {
+    type Interval = [L; 2];
+
     #[inline(always)]
-    fn candidates(&self, block: &Block, t_min: L, t_max: L) -> u32 {
-        let p = self.project(block);
+    fn interval(&self, t_min: f32, t_max: f32) -> [L; 2] {
+        self.depths(t_min, t_max)
+    }
+
+    #[inline(always)]
+    fn candidates(&self, leaf: &Leaf<'_>, depths: &[L; 2]) -> (u32, Known<L>) {
+        let p = self.project(leaf);
         let [e0, e1, e2] = p.edges;
         let zero = L::splat(0.0);
         let hit = zero.le(e0.min(e1).min(e2)) | e0.max(e1).max(e2).le(zero);
-        hit & self.within(&p, t_min, t_max)
+        (hit & p.within(depths) & leaf.lanes, p.edges)
     }
 }
 
@@ -117,16 +162,23 @@ impl<L: Lanes> Filter<L> for Sheared<L> {
 pub(crate) struct Margin<L>(pub(crate) Sheared<L>);
 
 impl<L: Lanes> Filter<L> for Margin<L> {
+    type Interval = [L; 2];
+
     #[inline(always)]
-    fn candidates(&self, block: &Block, t_min: L, t_max: L) -> u32 {
-        let p = self.0.project(block);
+    fn interval(&self, t_min: f32, t_max: f32) -> [L; 2] {
+        self.0.depths(t_min, t_max)
+    }
+
+    #[inline(always)]
+    fn candidates(&self, leaf: &Leaf<'_>, depths: &[L; 2]) -> (u32, Known<L>) {
+        let p = self.0.project(leaf);
         let ([e0, e1, e2], m) = (p.edges, p.size);
         // Coordinates up to m (plus x), each off by x: a product is off by 2mx + x^2, and rounded; two of them.
-        let x = self.0.off;
+        let x = L::splat(self.0.off);
         let bound = m.mul(x).mul(L::splat(4.5)).add(x.mul(x).mul(L::splat(3.0))).add(m.mul(m).mul(L::splat(4e-7)));
         let least = L::splat(0.0).sub(bound);
         let hit = least.le(e0.min(e1).min(e2)) | e0.max(e1).max(e2).le(bound);
-        hit & self.0.within(&p, t_min, t_max)
+        (hit & p.within(depths) & leaf.lanes, p.edges)
     }
 }
 
@@ -145,29 +197,36 @@ impl<L: Lanes> Plain<L> {
 }
 
 impl<L: Lanes> Filter<L> for Plain<L> {
+    type Interval = [L; 2];
+
     #[inline(always)]
-    fn candidates(&self, block: &Block, t_min: L, t_max: L) -> u32 {
-        let [v0, v1, v2] = [load(&block.0[0]), load(&block.0[1]), load(&block.0[2])];
+    fn interval(&self, t_min: f32, t_max: f32) -> [L; 2] {
+        [L::splat(t_min), L::splat(t_max)]
+    }
+
+    #[inline(always)]
+    fn candidates(&self, leaf: &Leaf<'_>, [t_min, t_max]: &[L; 2]) -> (u32, Known<L>) {
+        let [v0, v1, v2] = [leaf.vertex::<L>(0), leaf.vertex(1), leaf.vertex(2)];
         let (e1, e2) = (minus(v1, v0), minus(v2, v0));
         let p = cross(self.direction, e2);
-        let inverse = L::splat(1.0).div(dot(e1, p));
+        let det = dot(e1, p);
         let s = minus(self.origin, v0);
-        let u = dot(s, p).mul(inverse);
         let q = cross(s, e1);
-        let v = dot(self.direction, q).mul(inverse);
+        let (u, v) = (dot(s, p), dot(self.direction, q));
+        let (a, b, zero) = (u.turned_by(det), v.turned_by(det), L::splat(0.0));
+        let inside = zero.le(a) & zero.le(b) & a.add(b).le(det.abs()) & leaf.lanes;
+        if inside == 0 {
+            return (0, [zero; 3]);
+        }
+        let inverse = L::splat(1.0).div(det);
         let t = dot(e2, q).mul(inverse);
-        let (zero, one) = (L::splat(0.0), L::splat(1.0));
-        zero.le(u) & zero.le(v) & u.add(v).le(one) & t_min.le(t) & t.le(t_max)
+        (inside & t_min.le(t) & t.le(*t_max), [t, u.mul(inverse), v.mul(inverse)])
     }
 }
 
 #[inline(always)]
 fn splat<L: Lanes>(v: Vec3) -> Vectors<L> {
     [L::splat(v.x), L::splat(v.y), L::splat(v.z)]
-}
-#[inline(always)]
-fn load<L: Lanes>(v: &[[f32; 8]; 3]) -> Vectors<L> {
-    [L::load(&v[0]), L::load(&v[1]), L::load(&v[2])]
 }
 #[inline(always)]
 fn minus<L: Lanes>(a: Vectors<L>, b: Vectors<L>) -> Vectors<L> {
@@ -182,20 +241,32 @@ fn dot<L: Lanes>(a: Vectors<L>, b: Vectors<L>) -> L {
     a[0].mul(b[0]).add(a[1].mul(b[1])).add(a[2].mul(b[2]))
 }
 
-/// One or the other, as is known when compiling; what is not used costs nothing.
+/// One or the other, by [`Guards::WATERTIGHT`]; what is known when compiling costs nothing.
 #[derive(Clone, Copy)]
-pub(crate) struct Either<L, const WATERTIGHT: bool> {
+pub(crate) struct Either<L, G> {
+    pub(crate) guards: G,
     pub(crate) plain: Plain<L>,
     pub(crate) sheared: Sheared<L>,
 }
 
-impl<L: Lanes, const WATERTIGHT: bool> Filter<L> for Either<L, WATERTIGHT> {
+impl<L: Lanes, G: GuardSet> Filter<L> for Either<L, G> {
+    type Interval = [L; 2];
+
     #[inline(always)]
-    fn candidates(&self, block: &Block, t_min: L, t_max: L) -> u32 {
-        if WATERTIGHT {
-            self.sheared.candidates(block, t_min, t_max)
+    fn interval(&self, t_min: f32, t_max: f32) -> [L; 2] {
+        if self.guards.has(Guards::WATERTIGHT) {
+            self.sheared.interval(t_min, t_max)
         } else {
-            self.plain.candidates(block, t_min, t_max)
+            self.plain.interval(t_min, t_max)
+        }
+    }
+
+    #[inline(always)]
+    fn candidates(&self, leaf: &Leaf<'_>, interval: &[L; 2]) -> (u32, Known<L>) {
+        if self.guards.has(Guards::WATERTIGHT) {
+            self.sheared.candidates(leaf, interval)
+        } else {
+            self.plain.candidates(leaf, interval)
         }
     }
 }
@@ -208,7 +279,7 @@ mod tests {
     use proptest::prelude::*;
 
     struct Candidates<'a> {
-        block: &'a Block,
+        leaf: Leaf<'a>,
         origin: Vec3,
         direction: Vec3,
         off: f32,
@@ -221,11 +292,11 @@ mod tests {
         fn run<L: Lanes>(self) -> [u32; 3] {
             let shear = Shear::new(self.direction);
             let sheared = Sheared::<L>::new(self.origin, self.direction, &shear, self.off, 1e-5);
-            let [low, high] = [L::splat(self.interval[0]), L::splat(self.interval[1])];
+            let ([low, high], plain) = (self.interval, Plain::<L>::new(self.origin, self.direction));
             [
-                Plain::<L>::new(self.origin, self.direction).candidates(self.block, low, high),
-                sheared.candidates(self.block, low, high),
-                Margin(sheared).candidates(self.block, low, high),
+                plain.candidates(&self.leaf, &plain.interval(low, high)).0,
+                sheared.candidates(&self.leaf, &sheared.interval(low, high)).0,
+                Margin(sheared).candidates(&self.leaf, &Margin(sheared).interval(low, high)).0,
             ]
         }
     }
@@ -245,16 +316,17 @@ mod tests {
         ) {
             let (origin, direction) = (vector(&x[72..]), vector(&x[75..]));
             prop_assume!(direction != Vec3::ZERO);
-            let mut block = Block([[[f32::NAN; 8]; 3]; 3]);
+            let mut blocks = [Block([[[f32::NAN; 4]; 3]; 3]); 2];
             for lane in 0..used {
                 for v in 0..3 {
                     for k in 0..3 {
-                        block.0[v][k][lane] = x[lane * 9 + v * 3 + k];
+                        blocks[lane / 4].0[v][k][lane % 4] = x[lane * 9 + v * 3 + k];
                     }
                 }
             }
+            let leaf = Leaf { low: &blocks[0], high: &blocks[1], lanes: 0xff };
             let interval = [low, high];
-            let of = |level| run(Available::up_to(level), Candidates { block: &block, origin, direction, off: 1e-5, interval });
+            let of = |level| run(Available::up_to(level), Candidates { leaf, origin, direction, off: 1e-5, interval });
             let masks = of(Level::Scalar);
             for level in Level::ALL {
                 prop_assert_eq!(of(level), masks, "{}", level);
@@ -267,7 +339,7 @@ mod tests {
                     prop_assert_eq!(passes, [false; 3]);
                     continue;
                 }
-                let t = block.triangle(lane);
+                let t = blocks[lane / 4].triangle(lane % 4);
                 let inside = |t: f64| f64::from(low) <= t && t <= f64::from(high);
                 let plane = triangle::plane_parameter(t.map(|p| p.as_dvec3()), origin.as_dvec3(), direction.as_dvec3());
                 // The plane of a sliver tells little: there only triangles with some area are compared.

@@ -20,18 +20,17 @@ pub fn moeller_trumbore<R: Real>(v: [R::Vec3; 3], origin: R::Vec3, direction: R:
     let (e1, e2) = (v[1] - v[0], v[2] - v[0]);
     let p = direction.cross(e2);
     let det = e1.dot(p);
-    let inverse = R::ONE / det;
     let s = origin - v[0];
-    let u = s.dot(p) * inverse;
-    // Written so that NaN (no area, a parallel ray, overflow) is a miss.
-    if !(u >= R::ZERO && u <= R::ONE) {
-        return None;
-    }
     let q = s.cross(e1);
-    let v = direction.dot(q) * inverse;
-    if !(v >= R::ZERO && u + v <= R::ONE) {
+    // Times the determinant: signs tell, and nothing is divided for triangles that are missed.
+    let (u, v, t) = (s.dot(p), direction.dot(q), e2.dot(q));
+    let turned = |x: R| if det.is_sign_negative() { -x } else { x };
+    // Written so that NaN (overflow) is a miss.
+    if !(turned(u) >= R::ZERO && turned(v) >= R::ZERO && turned(u) + turned(v) <= det.abs()) {
         return None;
     }
-    let t = e2.dot(q) * inverse;
-    (inverse.is_finite() && t.is_finite()).then_some(TriangleHit { t, u, v })
+    let inverse = R::ONE / det;
+    let t = t * inverse;
+    // No area, or a parallel ray: the reciprocal is infinite.
+    (inverse.is_finite() && t.is_finite()).then_some(TriangleHit { t, u: u * inverse, v: v * inverse })
 }

@@ -29,21 +29,37 @@ pub struct Weights<R: Real> {
     pub v: R,
 }
 
+impl<R: Real> Weights<R> {
+    /// The weights that edge functions of one sign tell, those of the edges opposite to the vertices as
+    /// [`Shear::weights`] computes them. `None` where one is 0 (and `ZERO_TELLS_NOTHING`), or products over- or
+    /// underflowed: then their signs tell nothing for certain.
+    #[inline(always)]
+    #[must_use]
+    pub fn told<const ZERO_TELLS_NOTHING: bool>([e0, e1, e2]: [R; 3]) -> Option<Self> {
+        let inverse = R::ONE / (e0 + e1 + e2);
+        // A sum that is infinite or NaN (overflow), or too small for a reciprocal, tells nothing either.
+        let usable = inverse.is_finite() && inverse != R::ZERO;
+        let zero = e0 == R::ZERO || e1 == R::ZERO || e2 == R::ZERO;
+        let at_most_one = |x: R| if x < R::ONE { x } else { R::ONE };
+        (usable && !(ZERO_TELLS_NOTHING && zero))
+            .then(|| Self { u: at_most_one(e1 * inverse), v: at_most_one(e2 * inverse) })
+    }
+}
+
 impl<R: Real> Shear<R> {
     /// Setup for a direction, finite and not zero.
     #[inline]
     #[must_use]
     pub fn new(direction: R::Vec3) -> Self {
+        // No branches: directions of many rays are not to be predicted.
         let a = direction.abs();
-        let axis = if a.x() > a.y() {
-            if a.x() > a.z() { 0 } else { 2 }
-        } else if a.y() > a.z() {
-            1
-        } else {
-            2
-        };
-        let (x, y, z) = permuted::<R>(direction, axis);
-        Self { axis, x: x / z, y: y / z }
+        let not_x = a.x() <= a.y();
+        let larger = if not_x { a.y() } else { a.x() };
+        let z = usize::from(larger <= a.z());
+        let axis = (usize::from(not_x) & (z ^ 1)) | z << 1;
+        let d = [direction.x(), direction.y(), direction.z(), direction.x(), direction.y(), R::ONE, R::ONE, R::ONE];
+        let of = |i: usize| d[(axis + i) & 7];
+        Self { axis, x: of(1) / of(0), y: of(2) / of(0) }
     }
 
     /// The shears of the first and second axis, in cyclic order after the one that the ray follows most.
@@ -92,14 +108,10 @@ impl<R: Real> Shear<R> {
         if below && above {
             return None;
         }
-        let inverse = R::ONE / (e0 + e1 + e2);
-        // A sum that is infinite or NaN (overflow), or too small for a reciprocal, tells nothing either.
-        let usable = inverse.is_finite() && inverse != R::ZERO;
-        let zero = e0 == R::ZERO || e1 == R::ZERO || e2 == R::ZERO;
-        if (ZERO_TELLS_NOTHING && zero) || !usable {
-            return undecided([(ax, ay), (bx, by), (cx, cy)]);
+        if let Some(weights) = Weights::told::<ZERO_TELLS_NOTHING>([e0, e1, e2]) {
+            return Some(weights);
         }
-        Some(Weights { u: (e1 * inverse).min(R::ONE), v: (e2 * inverse).min(R::ONE) })
+        undecided([(ax, ay), (bx, by), (cx, cy)])
     }
 
     /// Whether the line *crosses* the triangle: as [`Shear::weights`], but of the triangles that share the point where
