@@ -10,6 +10,7 @@ use firsthit_render::{CameraChoice, Crop, EffectOverrides, IntegratorChoice, Vie
 use glam::DVec3;
 
 use crate::accuracy::AccuracyArgs;
+use crate::bench::BenchArgs;
 use crate::values::{self, AovList, Color, Hdri, Plane, Resolution};
 
 const EXAMPLES: &str = "\
@@ -67,6 +68,8 @@ pub(crate) enum Command {
     Inspect(InspectArgs),
     /// Measure what accuracy costs in time, and check the hard cases.
     Accuracy(AccuracyArgs),
+    /// Measure how fast builds and queries are, obvhs's own traversals beside them.
+    Bench(BenchArgs),
     /// Print a script that completes this program's options in a shell.
     Completions {
         /// The shell.
@@ -75,7 +78,7 @@ pub(crate) enum Command {
     /// Print a manual page (roff).
     Man {
         /// The page of one command instead of the program's.
-        #[arg(value_parser = ["render", "inspect", "accuracy", "completions", "man"])]
+        #[arg(value_parser = ["render", "inspect", "accuracy", "bench", "completions", "man"])]
         command: Option<String>,
     },
 }

@@ -3,15 +3,18 @@
 
 mod accuracy;
 mod args;
+mod bench;
 mod config;
 mod console;
 mod error;
 mod hdri;
 mod inspect;
 mod interrupt;
+mod measured;
 mod progress;
 mod render;
 mod report;
+mod simd;
 mod target;
 mod values;
 
@@ -40,6 +43,7 @@ fn run(command: Command, config: Option<&std::path::Path>) -> Result<Exit, Failu
         Command::Render(args) => render::run(&args, config),
         Command::Inspect(args) => inspect::run(&args).map(|()| Exit::Done),
         Command::Accuracy(args) => accuracy::run(&args),
+        Command::Bench(args) => bench::run(&args),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "firsthit", &mut script);

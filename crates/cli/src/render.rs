@@ -20,6 +20,7 @@ use crate::hdri;
 use crate::interrupt::Interrupt;
 use crate::progress::{Progress, Style};
 use crate::report::{Counts, RenderReport, Seconds, effects, explain_effects, rays_in_words, warnings};
+use crate::simd;
 use crate::target::Target;
 use crate::values::{Hdri, Resolution};
 
@@ -75,7 +76,7 @@ impl Job<'_> {
 
         let started = Instant::now();
         self.console.detail("building trees");
-        let build = BuildOptions { precision: args.quality.precision, ..Default::default() };
+        let build = BuildOptions { precision: args.quality.precision, simd: simd::level()?, ..Default::default() };
         let trees = SceneBuilder::from_desc(&scene, build).build().map_err(|e| self.at_model(&e))?;
         let counts = Counts::new(&scene);
         let stage = Stage::new(Arc::new(scene), trees, &stage_options).map_err(|e| self.at_model(&e))?;

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
+use firsthit_accel::{BuildQuality, Layout};
 use firsthit_import::srgb;
 use firsthit_measure::scenario::{self, Scenario};
 use firsthit_render::{Aov, CameraChoice, Crop, EffectOverrides, EffectSet, IntegratorChoice, ViewTransform};
@@ -163,6 +164,20 @@ pub(crate) fn scenario(s: &str) -> Result<Scenario, String> {
     let known = || scenario::ALL.map(|s| s.id).join(", ");
     let found = scenario::ALL.into_iter().find(|known| known.id.eq_ignore_ascii_case(s.trim()));
     found.ok_or_else(|| format!("unknown scenario; there are: {}", known()))
+}
+
+pub(crate) fn layout(s: &str) -> Result<Layout, String> {
+    let known = || Layout::ALL.map(Layout::name).join(" or ");
+    Layout::ALL.into_iter().find(|l| l.name() == s).ok_or_else(|| format!("unknown layout '{s}' ({})", known()))
+}
+
+pub(crate) fn build(s: &str) -> Result<BuildQuality, String> {
+    match s {
+        "fast" => Ok(BuildQuality::Fast),
+        "balanced" => Ok(BuildQuality::Balanced),
+        "high" => Ok(BuildQuality::High),
+        _ => Err(format!("unknown build '{s}' (fast, balanced or high)")),
+    }
 }
 
 /// A whole number, also as `1e9`.

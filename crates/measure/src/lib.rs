@@ -3,6 +3,7 @@
 //!
 //! * [`run()`] measures: each [`Subject`] at every tier, and with each guard of the robust tier, on the ray sets of
 //!   [`workload`], timed by [`timing`], compared with the most careful tier by [`metric`].
+//! * [`bench`] measures speed alone: builds and queries, obvhs's own traversals beside them.
 //! * [`result`] is what a measurement comes to: plain data, which [`report`] turns into charts and a page.
 //! * [`corpus`] runs exact hard cases through every engine at every tier.
 //! * [`scenario`] holds what must be so on whole meshes, in any size; [`flat`] is a ray caster of its own for that.
@@ -10,6 +11,7 @@
 //! * [`mesh`] and [`random`] make input by rule.
 #![forbid(unsafe_code)]
 
+pub mod bench;
 pub mod corpus;
 pub mod decision;
 pub mod flat;

@@ -4,7 +4,7 @@ use std::hint::black_box;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use firsthit_accel::{BuildError, BuildOptions, Guards, Hit, Scene, SceneBuilder};
+use firsthit_accel::{BuildError, BuildOptions, Guards, Hit, Level, Scene, SceneBuilder};
 use firsthit_geometry::Precision;
 use firsthit_render::{Monitor, RenderOptions};
 
@@ -80,6 +80,8 @@ pub struct Options {
     pub shapes: bool,
     /// Whether to render a picture of each model at each tier; never with [`Effort::Quick`].
     pub pictures: bool,
+    /// The most demanding instructions that queries may use.
+    pub simd: Level,
 }
 
 impl Default for Options {
@@ -91,6 +93,7 @@ impl Default for Options {
             rays: RayKind::ALL.to_vec(),
             shapes: true,
             pictures: true,
+            simd: Level::default(),
         }
     }
 }
@@ -107,6 +110,12 @@ pub enum MeasureError {
         /// Why.
         error: BuildError,
     },
+    /// The processor has no such instructions.
+    #[error("this processor has no {0}")]
+    Level(Level),
+    /// No threads can be started.
+    #[error("threads: {0}")]
+    Threads(String),
     /// It cannot be rendered.
     #[error("{model}: {error}")]
     Picture {
@@ -180,12 +189,12 @@ struct Variant {
 fn variants(options: &Options) -> Vec<Variant> {
     let tier = |&precision: &Precision| Variant {
         guard: String::new(),
-        options: BuildOptions { precision, ..BuildOptions::default() },
+        options: BuildOptions { precision, simd: options.simd, ..BuildOptions::default() },
     };
     let robust = options.tiers.contains(&Precision::Robust) && options.effort != Effort::Quick;
     let guards = Guards::combinations().filter(|(_, g)| robust && *g != Guards::ALL).map(|(guard, guards)| Variant {
         guard,
-        options: BuildOptions { precision: Precision::Robust, guards, ..BuildOptions::default() },
+        options: BuildOptions { precision: Precision::Robust, guards, simd: options.simd, ..BuildOptions::default() },
     });
     options.tiers.iter().map(tier).chain(guards).collect()
 }
@@ -225,9 +234,9 @@ impl Run<'_> {
     }
 
     fn subject(&mut self, subject: &Subject) -> Result<(), BuildError> {
-        let Options { effort, seed, .. } = *self.options;
+        let Options { effort, seed, simd, .. } = *self.options;
         let build = |options| SceneBuilder::from_desc(&subject.desc, options).build();
-        let of = |precision| build(BuildOptions { precision, ..BuildOptions::default() });
+        let of = |precision| build(BuildOptions { precision, simd, ..BuildOptions::default() });
         let best = of(Precision::ALL[Precision::ALL.len() - 1])?;
         let fast = of(Precision::Fast)?;
         let asked: Vec<Asked> = ray_sets(subject, &best, &fast, &self.options.rays, effort.size(), seed)
@@ -286,7 +295,9 @@ impl Run<'_> {
             _ => (320, 180, 1),
         };
         let render = RenderOptions { width, height, spp, seed: self.options.seed, ..RenderOptions::default() };
-        let options = PictureOptions { tiers: self.options.tiers.clone(), render, ..PictureOptions::default() };
+        let build = BuildOptions { simd: self.options.simd, ..BuildOptions::default() };
+        let tiers = self.options.tiers.clone();
+        let options = PictureOptions { tiers, render, build, ..PictureOptions::default() };
         let scene = Arc::new(subject.desc.clone());
         match picture::measure(&subject.name, &scene, &options, &Quiet(self.monitor)) {
             Ok(rows) => self.accuracy.pictures.extend(rows),
@@ -381,7 +392,7 @@ impl Run<'_> {
 }
 
 /// The machine, as far as it can be told.
-fn machine() -> Machine {
+pub(crate) fn machine() -> Machine {
     let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let name =
         info.lines().find_map(|l| l.strip_prefix("model name")?.split_once(':').map(|(_, n)| n.trim().to_owned()));
@@ -423,7 +434,15 @@ mod tests {
     fn only_what_is_asked_for_is_measured() {
         let tiers = vec![Precision::Double];
         let rays = vec![RayKind::Shadow];
-        let options = Options { effort: Effort::Quick, tiers, rays, shapes: false, pictures: false, seed: 3 };
+        let options = Options {
+            effort: Effort::Quick,
+            tiers,
+            rays,
+            shapes: false,
+            pictures: false,
+            seed: 3,
+            ..Options::default()
+        };
         let accuracy = run(&[small()], &options, &()).unwrap();
         assert_eq!(accuracy.tiers.len(), 1);
         assert_eq!((accuracy.tiers[0].tier.as_str(), accuracy.tiers[0].rays.as_str()), ("double", "shadow"));

@@ -1,20 +1,19 @@
 //! `firsthit accuracy MODEL...`: measures, prints and writes.
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use firsthit_import::Imported;
 use firsthit_measure::report::{self, Charts};
 use firsthit_measure::result::Accuracy;
 use firsthit_measure::{Options, Subject};
 use firsthit_render::Monitor as _;
-use firsthit_render::output;
 
 use super::{AccuracyArgs, csv, table};
 use crate::console::{Console, print, print_json};
 use crate::error::{Exit, Failure};
 use crate::interrupt::Interrupt;
+use crate::measured::{self, check_target, write};
 use crate::progress::{Progress, Style};
+use crate::simd;
 
 /// Measures the models of the arguments.
 pub(crate) fn run(args: &AccuracyArgs) -> Result<Exit, Failure> {
@@ -32,6 +31,7 @@ pub(crate) fn run(args: &AccuracyArgs) -> Result<Exit, Failure> {
         seed: args.seed,
         tiers: args.tiers(),
         rays: args.rays(),
+        simd: simd::level()?,
         ..Options::default()
     };
     let accuracy = firsthit_measure::run(&subjects, &options, &progress);
@@ -56,49 +56,11 @@ pub(crate) fn run(args: &AccuracyArgs) -> Result<Exit, Failure> {
 
 /// The models of the arguments.
 pub(super) fn subjects(args: &AccuracyArgs, console: Console) -> Result<Vec<Subject>, Failure> {
-    let mut subjects = Vec::new();
-    for path in &args.models {
-        let options = firsthit_import::Options { up: args.up, ..Default::default() };
-        let Imported { scene, report } = firsthit_import::open(path, &options)?;
-        console.warnings(&report, false)?;
-        let subject = Subject::new(name(path, &args.models), scene);
-        if subject.triangles() == 0 {
-            let failure = Failure::failed(format_args!("{}: there is no triangle to aim at", path.display()));
-            return Err(failure.hint("analytic shapes are measured beside any model: --builtin"));
-        }
-        subjects.push(subject);
-    }
+    let mut subjects = measured::subjects(&args.models, args.up, console)?;
     if args.builtin {
         subjects.push(Subject::builtin());
     }
     Ok(subjects)
-}
-
-/// The file's name; the whole path where two models have the same.
-fn name(path: &Path, all: &[PathBuf]) -> String {
-    let same = all.iter().filter(|other| other.file_name() == path.file_name()).count();
-    match path.file_name() {
-        Some(name) if same < 2 => name.to_string_lossy().into_owned(),
-        _ => path.display().to_string(),
-    }
-}
-
-/// Refuses in time what cannot be written, and what would replace a model.
-fn check_target(file: &Path, models: &[PathBuf]) -> Result<(), Failure> {
-    let folder = file.parent().filter(|p| !p.as_os_str().is_empty());
-    if let Some(folder) = folder.filter(|f| !f.is_dir()) {
-        let failure = Failure::failed(format_args!("{}: there is no folder {}", file.display(), folder.display()));
-        return Err(failure.hint(format_args!("mkdir -p {}", folder.display())));
-    }
-    if file.is_dir() {
-        return Err(Failure::failed(format_args!("{}: this is a folder, not a file", file.display())));
-    }
-    if let Ok(full) = file.canonicalize()
-        && models.iter().any(|m| m.canonicalize().is_ok_and(|m| m == full))
-    {
-        return Err(Failure::failed(format_args!("{}: this is one of the models", file.display())));
-    }
-    output::try_path(file).map_err(Failure::failed)
 }
 
 /// One sheet goes to the file itself; several to files beside it, named after their models.
@@ -113,10 +75,4 @@ fn write_charts(path: &Path, accuracy: &Accuracy, console: Console) -> Result<()
                 .try_for_each(|(name, svg)| write(&path.with_file_name(format!("{stem}-{name}.svg")), svg, console))
         }
     }
-}
-
-fn write(path: &Path, text: &str, console: Console) -> Result<(), Failure> {
-    fs::write(path, text).map_err(|e| Failure::failed(format_args!("{}: {e}", path.display())))?;
-    console.say(format_args!("wrote {}", path.display()));
-    Ok(())
 }

@@ -16,6 +16,7 @@ use crate::args::InspectArgs;
 use crate::console::{Console, print, print_json};
 use crate::error::Failure;
 use crate::report::{Counts, Effect, effects, warnings};
+use crate::simd;
 
 /// Looks at a model and prints what is in it.
 pub(crate) fn run(args: &InspectArgs) -> Result<(), Failure> {
@@ -27,7 +28,7 @@ pub(crate) fn run(args: &InspectArgs) -> Result<(), Failure> {
     let load = started.elapsed().as_secs_f64();
 
     let started = Instant::now();
-    let options = BuildOptions { precision: args.precision, ..Default::default() };
+    let options = BuildOptions { precision: args.precision, simd: simd::level()?, ..Default::default() };
     let trees = SceneBuilder::from_desc(&scene, options).build().map_err(|e| at_model(args, &e))?;
     let build = started.elapsed().as_secs_f64();
 

@@ -29,6 +29,8 @@ pub(super) enum Mark {
     Tier(usize),
     /// A guard, by its place in the key: a, b, c, ...
     Guard(usize),
+    /// Something else than firsthit, shown beside it.
+    Other,
 }
 
 impl Mark {
@@ -73,6 +75,8 @@ pub(super) struct Chart {
     pub(super) band: String,
     /// The least error that could have been seen, so that the band is below whatever can be counted.
     pub(super) floor: Option<f64>,
+    /// Whether the upward axis shows no more than there is, instead of whole decades.
+    pub(super) close: bool,
     pub(super) points: Vec<Point>,
 }
 
@@ -128,7 +132,10 @@ impl Chart {
         let band = if rows > 0 { rows as f64 * ROW + BAND_TITLE } else { 0.0 };
         let plot_bottom = BOTTOM - band;
         let errors = shown.iter().flat_map(|p| [p.error, p.worst.unwrap_or(p.error)]);
-        let y = LogScale::decades(errors, self.floor, (plot_bottom, TOP));
+        let y = match self.close {
+            true => LogScale::around(errors, (plot_bottom - 8.0, TOP + 8.0)),
+            false => LogScale::decades(errors, self.floor, (plot_bottom, TOP)),
+        };
 
         self.draw_axes(out, x, y.as_ref(), plot_bottom);
         if band > 0.0 {
@@ -270,6 +277,7 @@ fn draw_point(out: &mut String, placed: &Placed<'_>, label: &Rect, x: &LogScale,
     let class = match point.mark {
         Mark::Tier(i) => format!("fh-t{}", i % 4),
         Mark::Guard(_) => "fh-guard".into(),
+        Mark::Other => "fh-other".into(),
     };
     let tip = escape(&point.tip);
     let _ = write!(out, "<g class=\"fh-point {class}\" tabindex=\"0\" role=\"img\"><title>{tip}</title>");
@@ -317,6 +325,7 @@ fn draw_point(out: &mut String, placed: &Placed<'_>, label: &Rect, x: &LogScale,
 pub(super) fn mark(mark: Mark, x: f64, y: f64) -> String {
     match mark {
         Mark::Guard(_) => format!("<circle class=\"fh-mark\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3.6\"/>"),
+        Mark::Other => format!("<circle class=\"fh-mark\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"5\"/>"),
         Mark::Tier(i) => match i % 4 {
             0 => format!("<circle class=\"fh-mark\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"6\"/>"),
             1 => format!(

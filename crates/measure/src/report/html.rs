@@ -9,7 +9,7 @@ use super::{
     table::{PICTURES, SHAPES, TIERS, table},
     text::{counted, escape, number},
 };
-use crate::result::{Accuracy, Model};
+use crate::result::{Accuracy, Machine, Model};
 
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
@@ -31,24 +31,30 @@ const SCRIPT_HASH: &str = "sha256-QYHcNMfL2T6X8nf5SkZ9fkoxVtl8T2JC/yDnt10bsdY=";
 /// ```
 #[must_use]
 pub fn html(accuracy: &Accuracy) -> String {
-    let mut out = format!(
+    let mut body = String::new();
+    header(&mut body, accuracy);
+    body += "<main>\n";
+    for (i, model) in accuracy.models.iter().enumerate() {
+        model_section(&mut body, accuracy, model, i);
+    }
+    shapes_section(&mut body, accuracy);
+    method_section(&mut body, accuracy);
+    body += "</main>\n";
+    page(&title(accuracy), &body)
+}
+
+/// A whole page with style and script. `body` is markup.
+pub(super) fn page(title: &str, body: &str) -> String {
+    format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; \
          script-src '{SCRIPT_HASH}'; img-src data:; base-uri 'none'; form-action 'none'\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <meta name=\"color-scheme\" content=\"light dark\">\n<link rel=\"icon\" href=\"data:,\">\n\
-         <title>{}</title>\n<style>{CHART_STYLE}{STYLE}</style>\n</head>\n<body>\n",
-        escape(&title(accuracy))
-    );
-    header(&mut out, accuracy);
-    out += "<main>\n";
-    for (i, model) in accuracy.models.iter().enumerate() {
-        model_section(&mut out, accuracy, model, i);
-    }
-    shapes_section(&mut out, accuracy);
-    method_section(&mut out, accuracy);
-    let _ = write!(out, "</main>\n<script>{SCRIPT}</script>\n</body>\n</html>\n");
-    out
+         <title>{}</title>\n<style>{CHART_STYLE}{STYLE}</style>\n</head>\n<body>\n\
+         {body}<script>{SCRIPT}</script>\n</body>\n</html>\n",
+        escape(title)
+    )
 }
 
 fn title(accuracy: &Accuracy) -> String {
@@ -115,7 +121,7 @@ fn shapes_section(out: &mut String, accuracy: &Accuracy) {
 }
 
 /// Panels of which one is shown, chosen by radio buttons: that works without a script, and by keyboard.
-fn tabbed(name: &str, legend: &str, tabs: impl Iterator<Item = (String, String)>) -> String {
+pub(super) fn tabbed(name: &str, legend: &str, tabs: impl Iterator<Item = (String, String)>) -> String {
     let tabs: Vec<_> = tabs.collect();
     let mut out = format!("<div class=\"tabs\" role=\"group\" aria-label=\"{}\">\n", escape(legend));
     for (i, (label, _)) in tabs.iter().enumerate() {
@@ -159,12 +165,8 @@ fn charts(panel: &Panel<'_>) -> String {
 }
 
 fn method_section(out: &mut String, accuracy: &Accuracy) {
-    out.push_str("<section id=\"method\"><h2>How it was measured</h2>\n<dl>");
     let machine = &accuracy.machine;
-    for (what, value) in [
-        ("Processor", machine.cpu.clone()),
-        ("Logical processors", machine.cores.to_string()),
-        ("System", machine.os.clone()),
+    let facts = [
         (
             "Noise of timings",
             format!("{} % (interquartile range over median of the same work)", number(100.0 * machine.noise)),
@@ -172,18 +174,30 @@ fn method_section(out: &mut String, accuracy: &Accuracy) {
         ("Seed of all rays", accuracy.seed.to_string()),
         ("Effort", format!("{}, {} s in all", accuracy.effort, number(accuracy.seconds))),
         ("Version", format!("firsthit {}", accuracy.version)),
-    ] {
-        let value = if value.is_empty() { "unknown" } else { &value };
+    ];
+    facts_section(out, machine, &facts, &accuracy.notes);
+    out.push_str(include_str!("method.html"));
+    out.push_str("</section>\n");
+}
+
+/// The head of the section about machine and method, left open for more.
+pub(super) fn facts_section(out: &mut String, machine: &Machine, facts: &[(&str, String)], notes: &[String]) {
+    out.push_str("<section id=\"method\"><h2>How it was measured</h2>\n<dl>");
+    let of_machine = [
+        ("Processor", machine.cpu.clone()),
+        ("Logical processors", machine.cores.to_string()),
+        ("System", machine.os.clone()),
+    ];
+    for (what, value) in of_machine.iter().chain(facts) {
+        let value = if value.is_empty() { "unknown" } else { value };
         let _ = write!(out, "<div><dt>{what}</dt><dd>{}</dd></div>", escape(value));
     }
     out.push_str("</dl>\n");
-    if !accuracy.notes.is_empty() {
+    if !notes.is_empty() {
         out.push_str("<h3>Notes</h3>\n<ul class=\"notes\">");
-        for note in &accuracy.notes {
+        for note in notes {
             let _ = write!(out, "<li>{}</li>", escape(note));
         }
         out.push_str("</ul>\n");
     }
-    out.push_str(include_str!("method.html"));
-    out.push_str("</section>\n");
 }

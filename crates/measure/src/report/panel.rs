@@ -154,6 +154,7 @@ impl Metric {
             time_axis: "ns per ray, less is better; lines join the quartiles".into(),
             band,
             floor: most.map(|n| 1e6 / *n as f64),
+            close: false,
             points,
         }
     }
@@ -204,6 +205,7 @@ pub(super) fn shape_panels(accuracy: &Accuracy) -> Vec<(Panel<'_>, &str, Vec<&Sh
             time_axis: "ns per test, less is better".into(),
             band: "no error in 99 % of the rays".into(),
             floor: None,
+            close: false,
             points: rows.iter().filter(|r| r.shape == shape).map(|r| shape_point(r, &forms)).collect(),
         });
         let charts = charts.filter(|c| !c.is_empty()).collect();
@@ -245,6 +247,7 @@ pub(super) fn picture_panel<'a>(accuracy: &'a Accuracy, model: &Model) -> Option
         time_axis: "seconds for the picture, less is better".into(),
         band: "no difference".into(),
         floor: None,
+        close: false,
         points: rows
             .iter()
             .map(|r| Point {
@@ -285,7 +288,7 @@ pub(super) fn different(row: &PictureRow) -> String {
 }
 
 /// Each once, in the order of their first appearance.
-fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+pub(super) fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     let mut out = Vec::new();
     for name in names {
         if !out.contains(&name) {

@@ -10,9 +10,9 @@ use crate::result::{PictureRow, ShapeRow, TierRow};
 
 /// A column: what stands above it, what that means, and the cell of a row.
 pub(super) struct Column<R> {
-    head: &'static str,
-    meaning: &'static str,
-    cell: fn(&R) -> Cell,
+    pub(super) head: &'static str,
+    pub(super) meaning: &'static str,
+    pub(super) cell: fn(&R) -> Cell,
 }
 
 /// What stands in a table.
@@ -26,12 +26,17 @@ pub(super) struct Cell {
 }
 
 impl Cell {
-    fn words(text: &str) -> Self {
+    pub(super) fn words(text: &str) -> Self {
         Self { text: text.into(), value: None, hint: String::new() }
     }
 
-    fn number(value: f64) -> Self {
+    pub(super) fn number(value: f64) -> Self {
         Self { text: number(value), value: Some(value), hint: String::new() }
+    }
+
+    /// What points at it is told this.
+    pub(super) fn hint(self, hint: String) -> Self {
+        Self { hint, ..self }
     }
 
     /// A count; a zero is said to be less than 3 in N.

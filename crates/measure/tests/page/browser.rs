@@ -3,12 +3,15 @@
 //! Where no browser is installed the tests are skipped with a reason; with `FIRSTHIT_REQUIRE_SHARED=1` they fail.
 
 use std::{
+    collections::HashSet,
     fs,
     path::{Path, PathBuf},
     process::{Command, Stdio},
     time::{Duration, Instant},
 };
 
+use firsthit_measure::Subject;
+use firsthit_measure::bench::{self, BenchOptions};
 use firsthit_measure::report::{self, Charts};
 
 use super::sample;
@@ -120,8 +123,33 @@ fn page_and_charts_can_be_seen() {
         let arguments = [&format!("--screenshot={}", shot.display()), "--window-size=1120,900"];
         open(&browser, dir.path(), &file, &arguments.map(|a| a as &str));
         let picture = image::open(&shot).unwrap().to_rgb8();
-        let colours: std::collections::HashSet<_> = picture.pixels().map(|p| p.0).collect();
+        let colours: HashSet<_> = picture.pixels().map(|p| p.0).collect();
         assert!(colours.len() > 50, "{name} shows {} colours", colours.len());
         fs::remove_file(shot).unwrap();
     }
+}
+
+/// The page of a real, small measurement of speed.
+#[test]
+fn the_page_of_speeds_runs_in_a_browser() {
+    let Some(browser) = browser_or_skip() else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let options = BenchOptions { count: 500, budget: Duration::ZERO, ..BenchOptions::default() };
+    let bench = bench::run(&[Subject::builtin()], &options, &()).unwrap();
+    let page = report::bench_html(&bench);
+    let file = dir.path().join("bench.html");
+    fs::write(&file, &page).unwrap();
+    let dom = open(&browser, dir.path(), &file, &["--dump-dom"]);
+    // A bar and a point in the chart of memory for each row.
+    let points = page.matches("class=\"fh-point").count();
+    assert_eq!(points, 2 * bench.rows.len());
+    assert_eq!(root_attribute(&dom, "data-points"), Some(&*points.to_string()), "the script ran to its end");
+    assert_eq!(root_attribute(&dom, "data-errors"), None);
+
+    let shot = dir.path().join("shot.png");
+    let arguments = [&format!("--screenshot={}", shot.display()), "--window-size=1120,900"];
+    open(&browser, dir.path(), &file, &arguments.map(|a| a as &str));
+    let picture = image::open(&shot).unwrap().to_rgb8();
+    let colours: HashSet<_> = picture.pixels().map(|p| p.0).collect();
+    assert!(colours.len() > 50, "{} colours", colours.len());
 }

@@ -6,6 +6,7 @@ mod sample;
 use std::collections::HashSet;
 
 use firsthit_measure::{
+    bench::{Bench, BenchModel, BuildRow, SpeedRow},
     report::{self, Charts},
     result::{Accuracy, Model, TierRow},
 };
@@ -38,6 +39,25 @@ fn text_of_the_measurement_cannot_become_markup() {
     for (name, svg) in report::svg(&accuracy, Charts::Each).into_iter().chain([("page".into(), page)]) {
         assert!(!svg.contains("<img") && !svg.contains("alert(1)<"), "{name}");
         assert!(!svg.contains('\0'), "{name}");
+    }
+}
+
+#[test]
+fn text_of_a_measurement_of_speed_cannot_become_markup() {
+    let evil = "</style></script><script>alert(1)</script><img src=x onerror=alert(1)>\"'&\u{0}";
+    let bench = Bench {
+        version: evil.into(),
+        models: vec![BenchModel { name: evil.into(), triangles: 1 }],
+        builds: vec![BuildRow { model: evil.into(), engine: evil.into(), ..BuildRow::default() }],
+        rows: vec![SpeedRow { model: evil.into(), engine: evil.into(), rays: evil.into(), ..SpeedRow::default() }],
+        notes: vec![evil.into()],
+        ..Bench::default()
+    };
+    for page in [report::bench_html(&bench), report::bench_html(&Bench::default())] {
+        assert_eq!(page.matches("<script").count(), 1, "only the page's own");
+        assert!(!page.contains("<img") && !page.contains("alert(1)<") && !page.contains('\0'));
+        let words = page.split("<script>").next().unwrap();
+        assert!(words.contains("How it was measured") && !words.contains("NaN"));
     }
 }
 

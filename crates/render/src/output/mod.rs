@@ -121,6 +121,14 @@ pub fn files(path: &Path, aovs: &[Aov]) -> Result<Vec<PathBuf>, OutputError> {
     Ok(std::iter::once(path.to_owned()).chain(aovs.iter().map(|aov| beside(path, *aov))).collect())
 }
 
+/// Writes a text so that it appears whole or not at all: reports that stand beside pictures.
+///
+/// # Errors
+/// [`OutputError::Io`] when it cannot be written.
+pub fn write_text(path: &Path, text: &str) -> Result<(), OutputError> {
+    atomically(path, |out| out.write_all(text.as_bytes())).map_err(failed(path))
+}
+
 /// Whether a file can be written there, by creating and removing what [`write_film`] would rename at the end. A file
 /// of that name stays as it is.
 ///
