@@ -36,7 +36,7 @@ fn box_tests_of_the_trees_pass_the_hard_cases() {
     check([Engine::Slabs].into_iter());
 }
 
-/// Every layout, by one ray, a slice of rays, and on several threads.
+/// Every layout and SIMD level, by one ray, a slice of rays, and on several threads.
 #[test]
 fn scenes_pass_the_hard_cases() {
     check(Engine::all().into_iter().filter(|e| matches!(e, Engine::Scene(..))));

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use firsthit_accel::{BuildOptions, Geometry, Layout, Scene, SceneBuilder};
+use firsthit_accel::{BuildOptions, Geometry, Layout, Level, Scene, SceneBuilder};
 use firsthit_geometry::shapes::{Cuboid, Disk, Plane, Polygon, Quadric, Sphere};
 use firsthit_geometry::{
     Aabb, Precision, Primitive as _, Ray, Real, Shape, ShapeError, Vector3, slab as slab_test, triangle,
@@ -19,7 +19,7 @@ pub enum Engine {
     /// The slab tests of the trees; they only have boxes.
     Slabs,
     /// A scene of one instance: tree, transform and primitive test together.
-    Scene(Layout, Form),
+    Scene(Layout, Level, Form),
 }
 
 /// How a scene is asked.
@@ -39,11 +39,16 @@ impl Form {
 }
 
 impl Engine {
-    /// All engines: scenes of each layout, asked in each form.
+    /// All engines: scenes of each layout, by each SIMD level that this processor has, asked in each form.
     #[must_use]
     pub fn all() -> Vec<Self> {
-        let scenes = Layout::ALL.into_iter().flat_map(|l| Form::ALL.map(|f| Self::Scene(l, f)));
-        [Self::Primitives, Self::Slabs].into_iter().chain(scenes).collect()
+        let mut engines = vec![Self::Primitives, Self::Slabs];
+        for layout in Layout::ALL {
+            for level in Level::ALL.into_iter().filter(|l| l.is_available()) {
+                engines.extend(Form::ALL.map(|form| Self::Scene(layout, level, form)));
+            }
+        }
+        engines
     }
 
     /// Answers a case at a tier.
@@ -55,7 +60,7 @@ impl Engine {
                 Precision::Double | Precision::Exact => primitive::<f64>(case, precision, &case.ray.to_f64()),
             },
             Self::Slabs => slab(case, precision),
-            Self::Scene(layout, form) => scene(case, precision, layout, form),
+            Self::Scene(layout, level, form) => scene(case, precision, layout, level, form),
         }
     }
 
@@ -76,13 +81,13 @@ impl fmt::Display for Engine {
         match self {
             Self::Primitives => f.write_str("primitive tests"),
             Self::Slabs => f.write_str("slab tests"),
-            Self::Scene(layout, form) => {
+            Self::Scene(layout, level, form) => {
                 let form = match form {
                     Form::One => "one ray",
                     Form::Slice => "slice",
                     Form::Parallel => "parallel",
                 };
-                write!(f, "scene {layout:?}, {form}")
+                write!(f, "scene {layout:?}, {level}, {form}")
             }
         }
     }
@@ -190,8 +195,9 @@ fn slab(case: &Case, precision: Precision) -> Answer {
     }
 }
 
-fn scene(case: &Case, precision: Precision, layout: Layout, form: Form) -> Answer {
-    let scene = match build(&case.prim, precision, layout) {
+fn scene(case: &Case, precision: Precision, layout: Layout, level: Level, form: Form) -> Answer {
+    let options = BuildOptions { precision, layout, simd: level, ..BuildOptions::default() };
+    let scene = match build(&case.prim, options) {
         Ok(Some(scene)) => scene,
         Ok(None) => return Answer::Skipped("no such primitive"),
         Err(e) => return Answer::Refused(e),
@@ -231,7 +237,7 @@ fn scene(case: &Case, precision: Precision, layout: Layout, form: Form) -> Answe
     }
 }
 
-fn build(prim: &Primitive, precision: Precision, layout: Layout) -> Result<Option<Scene>, String> {
+fn build(prim: &Primitive, options: BuildOptions) -> Result<Option<Scene>, String> {
     let geometry = match prim {
         Primitive::Triangle { v } => {
             Geometry::Triangles { positions: v.iter().map(|p| vector(*p)).collect(), triangles: vec![[0, 1, 2]] }
@@ -249,7 +255,7 @@ fn build(prim: &Primitive, precision: Precision, layout: Layout) -> Result<Optio
             None => return Ok(None),
         },
     };
-    let mut builder = SceneBuilder::new(BuildOptions { precision, layout, ..BuildOptions::default() });
+    let mut builder = SceneBuilder::new(options);
     let mesh = builder.add_mesh(vec![geometry]);
     builder.add_instance(mesh, DAffine3::IDENTITY);
     builder.build().map(Some).map_err(|e| e.to_string())
