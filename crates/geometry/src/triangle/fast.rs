@@ -31,6 +31,8 @@ pub fn moeller_trumbore<R: Real>(v: [R::Vec3; 3], origin: R::Vec3, direction: R:
     }
     let inverse = R::ONE / det;
     let t = t * inverse;
-    // No area, or a parallel ray: the reciprocal is infinite.
-    (inverse.is_finite() && t.is_finite()).then_some(TriangleHit { t, u: u * inverse, v: v * inverse })
+    // No area, or a parallel ray: the reciprocal is infinite. Near overflow it is 0 or has lost digits, and the weights
+    // might be above 1.
+    let usable = inverse.is_finite() && inverse.abs() >= R::MIN_POSITIVE;
+    (usable && t.is_finite()).then_some(TriangleHit { t, u: u * inverse, v: v * inverse })
 }
