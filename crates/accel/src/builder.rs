@@ -77,6 +77,6 @@ impl SceneBuilder {
     /// # Errors
     /// When a vertex, index or transform is unusable: see [`BuildError`].
     pub fn build(self) -> Result<Scene, BuildError> {
-        Scene::new(self.options, &self.meshes, &self.instances)
+        Scene::new(self.options, &self.meshes, self.instances)
     }
 }

@@ -54,4 +54,50 @@ pub enum BuildError {
         /// How many there may be.
         limit: u64,
     },
+    /// A refit of a mesh that is not there.
+    #[error("mesh {mesh} does not exist (there are {count})")]
+    UnknownMesh {
+        /// Index of the mesh.
+        mesh: usize,
+        /// How many meshes there are.
+        count: usize,
+    },
+    /// A refit keeps the number of a mesh's geometries.
+    #[error("mesh {mesh} was built of {before} geometries, and now has {now}")]
+    GeometriesChanged {
+        /// Index of the mesh.
+        mesh: usize,
+        /// How many there were.
+        before: usize,
+        /// How many there are.
+        now: usize,
+    },
+    /// A refit keeps the number of a geometry's triangles.
+    #[error("mesh {mesh}, geometry {geometry} was built of {before} triangles, and now has {now}")]
+    TrianglesChanged {
+        /// Index of the mesh.
+        mesh: usize,
+        /// Index of the geometry.
+        geometry: usize,
+        /// How many there were.
+        before: usize,
+        /// How many there are.
+        now: usize,
+    },
+    /// A refit makes no shape of triangles, nor the other way round.
+    #[error("mesh {mesh}, geometry {geometry} was built of triangles and is now a shape, or the other way round")]
+    KindChanged {
+        /// Index of the mesh.
+        mesh: usize,
+        /// Index of the geometry.
+        geometry: usize,
+    },
+    /// New transforms are given for all instances.
+    #[error("{instances} instances were given {transforms} transforms")]
+    TransformsChanged {
+        /// How many instances there are.
+        instances: usize,
+        /// How many transforms were given.
+        transforms: usize,
+    },
 }

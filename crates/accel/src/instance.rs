@@ -1,5 +1,7 @@
 //! Meshes placed in the world.
 
+use std::sync::Arc;
+
 use firsthit_geometry::{Aabb, transform::Transform};
 use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
@@ -38,7 +40,7 @@ impl Instance {
 
 /// Boxes in the world of what is bounded in each instance: of the vertices themselves where they are not too many in
 /// all, else of the model's box.
-pub(crate) fn tight_boxes(instances: &[Instance], models: &[Model]) -> Vec<Aabb<f64>> {
+pub(crate) fn tight_boxes(instances: &[Instance], models: &[Arc<Model>]) -> Vec<Aabb<f64>> {
     let all: u64 = instances.iter().map(|i| models[i.model as usize].triangle_count() * 3).sum();
     instances
         .par_iter()

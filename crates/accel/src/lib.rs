@@ -40,6 +40,7 @@ mod normalise;
 mod order;
 mod query;
 pub mod reference;
+mod refit;
 mod scene;
 #[allow(unsafe_code, reason = "the room for instructions of the processor")]
 mod simd;

@@ -97,6 +97,27 @@ pub(crate) enum Surface<'a> {
 impl Model {
     /// Checks and builds mesh number `mesh`.
     pub(crate) fn new(mesh: usize, geometries: &[Geometry], options: BuildOptions) -> Result<Self, BuildError> {
+        Self::make(mesh, geometries, options, None)
+    }
+
+    /// Mesh number `mesh`, changed: a tree of the same shape with new boxes. Where that has no place for something -
+    /// a triangle that had no area and now has, a shape that was unbounded - it is built anew.
+    pub(crate) fn refit(
+        &self,
+        mesh: usize,
+        geometries: &[Geometry],
+        options: BuildOptions,
+    ) -> Result<Self, BuildError> {
+        self.check_same(mesh, geometries)?;
+        Self::make(mesh, geometries, options, Some(self))
+    }
+
+    fn make(
+        mesh: usize,
+        geometries: &[Geometry],
+        options: BuildOptions,
+        old: Option<&Self>,
+    ) -> Result<Self, BuildError> {
         check(mesh, geometries)?;
         let scale = common_scale(geometries, options.precision);
         let normalised = |p: Vec3| (p.as_dvec3() / scale).as_vec3();
@@ -170,8 +191,23 @@ impl Model {
             Layout::Bvh2
         };
         let number = |&i: &u32| numbers.get(i as usize).copied().unwrap_or(u32::MAX);
-        match layout {
-            Layout::Bvh2 => {
+        // A place that is left empty has no number, so that whatever lies there is never hit.
+        let reused = old.and_then(|old| Some((&old.tree, old.order_of(&numbers)?)));
+        match (layout, reused) {
+            (Layout::Bvh2, Some((MeshTree::Binary { tree, depth, .. }, order))) => {
+                let triangle = |&i: &u32| triangles.get(i as usize).copied().unwrap_or_default();
+                model.numbers = order.iter().map(number).collect();
+                model.tree = MeshTree::Binary {
+                    tree: tree.refit(&order, &boxes),
+                    triangles: order.iter().map(triangle).collect(),
+                    depth: *depth,
+                };
+            }
+            (Layout::Wide8, Some((MeshTree::Wide { tree, level }, order))) => {
+                model.numbers = order.iter().map(number).collect();
+                model.tree = MeshTree::Wide { tree: tree.refit(&order, &triangles, &boxes), level: *level };
+            }
+            (Layout::Bvh2, _) => {
                 let topology = Topology::new(&near_one(&boxes, &model.bounds), options.quality);
                 model.numbers = topology.order.iter().map(number).collect();
                 model.tree = MeshTree::Binary {
@@ -180,7 +216,7 @@ impl Model {
                     depth: topology.depth(),
                 };
             }
-            Layout::Wide8 => {
+            (Layout::Wide8, _) => {
                 let topology = Topology::single(&boxes, options.quality);
                 let (tree, order) = Wide8::new(&topology, &triangles, &boxes);
                 model.numbers = order.iter().map(number).collect();
@@ -194,6 +230,38 @@ impl Model {
             }
         }
         Ok(model)
+    }
+
+    /// Whether a mesh has the geometries and numbers of triangles of this one.
+    fn check_same(&self, mesh: usize, geometries: &[Geometry]) -> Result<(), BuildError> {
+        let (before, now) = (self.places.len(), geometries.len());
+        if before != now {
+            return Err(BuildError::GeometriesChanged { mesh, before, now });
+        }
+        for (geometry, (places, g)) in self.places.iter().zip(geometries).enumerate() {
+            match (places, g) {
+                (Places::Triangles(old), Geometry::Triangles { triangles, .. }) if old.len() != triangles.len() => {
+                    let (before, now) = (old.len(), triangles.len());
+                    return Err(BuildError::TrianglesChanged { mesh, geometry, before, now });
+                }
+                (Places::Triangles(_), Geometry::Triangles { .. }) | (Places::Shape(_), Geometry::Shape(_)) => {}
+                _ => return Err(BuildError::KindChanged { mesh, geometry }),
+            }
+        }
+        Ok(())
+    }
+
+    /// Which of some primitives, given by ascending numbers, is at each place of the leaves: `u32::MAX` where none is.
+    /// `None` if one of them has no place.
+    fn order_of(&self, numbers: &[u32]) -> Option<Vec<u32>> {
+        let mut indices = vec![u32::MAX; numbers.last().map_or(0, |n| *n as usize + 1)];
+        for (i, &n) in numbers.iter().enumerate() {
+            indices[n as usize] = i as u32;
+        }
+        let order: Vec<u32> =
+            self.numbers.iter().map(|&n| indices.get(n as usize).copied().unwrap_or(u32::MAX)).collect();
+        let found = order.iter().filter(|&&i| i != u32::MAX).count();
+        (found == numbers.len()).then_some(order)
     }
 
     pub(crate) fn scale(&self) -> f64 {

@@ -49,7 +49,10 @@ pub struct Scene {
 #[derive(Debug)]
 struct Inner {
     options: BuildOptions,
-    models: Vec<Model>,
+    /// Shared with the scenes that are made of this one by moving something else.
+    models: Vec<Arc<Model>>,
+    /// The mesh and transform of each instance, as given.
+    placed: Vec<(usize, DAffine3)>,
     instances: Vec<Instance>,
     /// Over the instances with something bounded in them.
     tree: Bvh2<f64>,
@@ -67,12 +70,21 @@ impl Scene {
     pub(crate) fn new(
         options: BuildOptions,
         meshes: &[Vec<Geometry>],
-        placed: &[(usize, DAffine3)],
+        placed: Vec<(usize, DAffine3)>,
     ) -> Result<Self, BuildError> {
         limit("meshes", meshes.len() as u64)?;
         limit("instances", placed.len() as u64)?;
-        let models: Vec<Model> =
-            meshes.par_iter().enumerate().map(|(i, m)| Model::new(i, m, options)).collect::<Result<_, _>>()?;
+        let build = |(i, mesh): (usize, &Vec<Geometry>)| Model::new(i, mesh, options).map(Arc::new);
+        let models = meshes.par_iter().enumerate().map(build).collect::<Result<_, _>>()?;
+        Self::place(options, models, placed)
+    }
+
+    /// A scene of models that are built.
+    pub(crate) fn place(
+        options: BuildOptions,
+        models: Vec<Arc<Model>>,
+        placed: Vec<(usize, DAffine3)>,
+    ) -> Result<Self, BuildError> {
         let instances: Vec<Instance> = placed
             .iter()
             .enumerate()
@@ -102,7 +114,7 @@ impl Scene {
 
         let round_trip = instances.iter().fold(0.0, |most: f64, i| most.max(i.transform.round_trip()));
         let stats = SceneStats::default();
-        let mut inner = Inner { options, models, instances, tree, order, unbounded, bounds, round_trip, stats };
+        let mut inner = Inner { options, models, placed, instances, tree, order, unbounded, bounds, round_trip, stats };
         inner.stats = inner.stats(topology.depth());
         Ok(Self { inner: Arc::new(inner) })
     }
@@ -173,8 +185,12 @@ impl Scene {
         self.inner.options
     }
 
-    pub(crate) fn models(&self) -> &[Model] {
+    pub(crate) fn models(&self) -> &[Arc<Model>] {
         &self.inner.models
+    }
+
+    pub(crate) fn placed(&self) -> &[(usize, DAffine3)] {
+        &self.inner.placed
     }
 
     pub(crate) fn instances(&self) -> &[Instance] {
@@ -448,17 +464,17 @@ impl Inner {
 
     fn stats(&self, depth: u32) -> SceneStats {
         let stored = |m: &Model| m.triangle_count();
-        let weight: u64 = self.models.iter().map(stored).sum();
+        let weight: u64 = self.models.iter().map(|m| stored(m)).sum();
         let cost: f64 = self.models.iter().map(|m| m.sah_cost() * m.triangle_count() as f64).sum();
-        let models: usize = self.models.iter().map(Model::bytes).sum();
+        let models: usize = self.models.iter().map(|m| m.bytes()).sum();
         SceneStats {
             stored_triangles: weight,
             instanced_triangles: self.instances.iter().map(|i| stored(&self.models[i.model as usize])).sum(),
             instances: self.instances.len() as u64,
             sah_cost: if weight > 0 { cost / weight as f64 } else { 0.0 },
-            depth: depth + self.models.iter().map(Model::depth).max().unwrap_or(0),
+            depth: depth + self.models.iter().map(|m| m.depth()).max().unwrap_or(0),
             bytes: (models + self.tree.bytes() + size_of_val(self.instances.as_slice())) as u64,
-            degenerate_triangles: self.models.iter().map(Model::degenerate).sum(),
+            degenerate_triangles: self.models.iter().map(|m| m.degenerate()).sum(),
         }
     }
 }

@@ -12,6 +12,7 @@ fn hold(check: Check, length: usize, least: u32) {
     let met = Cell::new(0);
     let config = Config { cases: 10_000, failure_persistence: None, ..Config::default() };
     // The same inputs in every run: exploring is for the fuzzer.
+    // The same inputs in every run: exploring is for the fuzzer.
     TestRunner::new_with_rng(config, TestRng::deterministic_rng(RngAlgorithm::ChaCha))
         .run(&vec(any::<u8>(), 0..length), |data| {
             met.set(met.get() + u32::from(check(&data)));

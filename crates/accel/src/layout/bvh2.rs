@@ -27,23 +27,36 @@ const _: () = assert!(size_of::<Node<f32>>() == 64);
 impl<R: Real> Bvh2<R> {
     /// Boxes are joined upwards from those of the primitives.
     pub(crate) fn new(topology: &Topology, boxes: &[Aabb<R>]) -> Self {
-        let empty = Node { planes: [[[R::INFINITY; 2]; 2]; 3], children: [Child::default(); 2] };
-        let mut nodes = vec![empty; topology.nodes.len()];
-        for i in (0..nodes.len()).rev() {
-            let children = topology.nodes[i];
-            let below = children.map(|c| {
+        let planes = [[[R::INFINITY; 2]; 2]; 3];
+        let nodes = topology.nodes.iter().map(|&children| Node { planes, children }).collect();
+        let mut tree = Self { root: topology.root, nodes };
+        tree.set_boxes(&topology.order, boxes);
+        tree
+    }
+
+    /// A tree of the same shape over boxes in this order of the leaves; `u32::MAX` stands for a place with nothing.
+    pub(crate) fn refit(&self, order: &[u32], boxes: &[Aabb<R>]) -> Self {
+        let mut tree = self.clone();
+        tree.set_boxes(order, boxes);
+        tree
+    }
+
+    fn set_boxes(&mut self, order: &[u32], boxes: &[Aabb<R>]) {
+        for i in (0..self.nodes.len()).rev() {
+            let [l, r] = self.nodes[i].children.map(|c| {
                 if c.is_leaf() {
-                    topology.order[c.range()].iter().fold(Aabb::empty(), |b, &p| b.union(boxes[p as usize]))
+                    order[c.range()]
+                        .iter()
+                        .filter_map(|&p| boxes.get(p as usize))
+                        .fold(Aabb::empty(), |a, b| a.union(*b))
                 } else {
-                    let node = &nodes[c.first as usize];
+                    let node = &self.nodes[c.first as usize];
                     node.child_box(0).union(node.child_box(1))
                 }
             });
-            nodes[i].children = children;
-            let [l, r]: [Aabb<R>; 2] = below;
-            nodes[i].planes = [0, 1, 2].map(|k| [[l.min.axis(k), r.min.axis(k)], [-l.max.axis(k), -r.max.axis(k)]]);
+            self.nodes[i].planes =
+                [0, 1, 2].map(|k| [[l.min.axis(k), r.min.axis(k)], [-l.max.axis(k), -r.max.axis(k)]]);
         }
-        Self { root: topology.root, nodes }
     }
 
     /// Surface-area cost: the expected number of nodes and primitives that a random line through the root's box is

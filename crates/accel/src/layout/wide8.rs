@@ -7,6 +7,8 @@
 //! Packets" (2008) and Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide
 //! BVHs" (HPG 2017) describe: the least expected number of nodes and blocks that a random line meets.
 
+use core::ops::Range;
+
 use firsthit_geometry::Aabb;
 use glam::Vec3;
 
@@ -52,6 +54,11 @@ impl Reference {
     pub(crate) fn block(self) -> usize {
         (self.0 & (MOST_BLOCKS - 1)) as usize
     }
+    /// Of a leaf: where its triangles are, `4 * block + lane`.
+    fn places(self) -> Range<usize> {
+        let first = self.block() * 4 + (self.0 >> 26 & 3) as usize;
+        first..first + self.lanes().count_ones() as usize
+    }
     /// Of a leaf: its lanes in two blocks.
     #[inline(always)]
     pub(crate) fn lanes(self) -> u32 {
@@ -89,6 +96,13 @@ impl Node {
         axis * 2 + side
     }
 
+    /// Around all children; those that are missing are empty.
+    fn bounds(&self) -> Aabb<f32> {
+        let p = &self.planes;
+        let child = |k: usize| Aabb::new(Vec3::new(p[0][k], p[2][k], p[4][k]), Vec3::new(p[1][k], p[3][k], p[5][k]));
+        (0..8).fold(Aabb::empty(), |all, k| all.union(child(k)))
+    }
+
     /// Writes one child's box.
     pub(crate) fn set_box(&mut self, child: usize, b: &Aabb<f32>) {
         for axis in 0..3 {
@@ -105,6 +119,14 @@ pub(crate) struct Block(pub(crate) [[[f32; 4]; 3]; 3]);
 
 impl Block {
     const EMPTY: Self = Self([[[f32::NAN; 4]; 3]; 3]);
+
+    fn set_triangle(&mut self, lane: usize, triangle: [Vec3; 3]) {
+        for (vertex, p) in triangle.iter().enumerate() {
+            for axis in 0..3 {
+                self.0[vertex][axis][lane] = p[axis];
+            }
+        }
+    }
 
     #[inline(always)]
     pub(crate) fn triangle(&self, lane: usize) -> [Vec3; 3] {
@@ -165,6 +187,40 @@ impl Wide8 {
             tree.sah_cost = if whole > 0.0 { f64::from(plan.cost[0]) / whole } else { 1.0 };
         }
         (tree, order)
+    }
+
+    /// A tree of the same shape over triangles in this order of the lanes; `u32::MAX` stands for a lane with nothing.
+    pub(crate) fn refit(&self, order: &[u32], triangles: &[[Vec3; 3]], boxes: &[Aabb<f32>]) -> Self {
+        let mut tree = self.clone();
+        for (place, &primitive) in order.iter().enumerate() {
+            let triangle = triangles.get(primitive as usize).copied();
+            tree.blocks[place / 4].set_triangle(place % 4, triangle.unwrap_or_default());
+        }
+        let mut below = 0.0;
+        // Children come after their parents.
+        for i in (0..tree.nodes.len()).rev() {
+            for k in 0..8 {
+                let child = Reference(tree.nodes[i].children[k]);
+                if child == Reference::NOTHING {
+                    continue;
+                }
+                let (bounds, cost) = if child.is_leaf() {
+                    let run = &order[child.places()];
+                    let used = run.iter().filter_map(|&p| boxes.get(p as usize));
+                    (used.fold(Aabb::empty(), |a, b| a.union(*b)), leaf_cost(run.len() as u32))
+                } else {
+                    (tree.nodes[child.index()].bounds(), 1.0)
+                };
+                tree.nodes[i].set_box(k, &bounds);
+                below += f64::from(cost * bounds.area());
+            }
+        }
+        // That of a single leaf stays.
+        if let Some(root) = tree.nodes.first() {
+            let whole = f64::from(root.bounds().area());
+            tree.sah_cost = if whole > 0.0 { 1.0 + below / whole } else { 1.0 };
+        }
+        tree
     }
 
     /// Expected number of nodes and leaves that a random line through the root's box meets.
@@ -231,11 +287,7 @@ impl Wide8 {
             if lane == 0 {
                 self.blocks.push(Block::EMPTY);
             }
-            for (vertex, p) in triangles[primitive as usize].iter().enumerate() {
-                for axis in 0..3 {
-                    self.blocks[block].0[vertex][axis][lane] = p[axis];
-                }
-            }
+            self.blocks[block].set_triangle(lane, triangles[primitive as usize]);
             order.push(primitive);
         }
         Reference::leaf(first, run.len())
@@ -361,6 +413,10 @@ mod tests {
         if tree.root != Reference::NOTHING {
             below(&tree, &order, tree.root);
         }
+        let again = tree.refit(&order, triangles, &boxes);
+        assert!(tree.nodes.iter().zip(&again.nodes).all(|(a, b)| a.planes == b.planes));
+        assert!((0..order.len()).all(|k| order[k] == u32::MAX || tree.triangle(k) == again.triangle(k)));
+        assert!((again.sah_cost - tree.sah_cost).abs() <= 1e-4 * tree.sah_cost, "{} {}", again.sah_cost, tree.sah_cost);
         if triangles.len() > 100 {
             let filled = triangles.len() as f64 / tree.blocks.len() as f64;
             assert!(filled > 3.0, "blocks hold {filled} triangles of 4");
