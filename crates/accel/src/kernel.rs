@@ -76,13 +76,13 @@ fn plane(vertices: &[Vec3; 3], ray: &LocalRay) -> Option<Plane> {
     let plain = nn > SLIVER * (e1.length_squared() * e2.length_squared())
         && along * along > STEEP * (nn * dd)
         && t.abs() > ray.near;
-    if plain { Some(Plane { t, normal, grazing: false }) } else { careful_plane(vertices, ray) }
+    if plain { Some(Plane { t, normal, grazing: false }) } else { careful_plane(*vertices, *ray) }
 }
 
-/// The same with all digits.
+/// The same with all digits. By value: what is passed by reference has to be kept in memory by the caller, always.
 #[inline(never)]
-fn careful_plane(vertices: &[Vec3; 3], ray: &LocalRay) -> Option<Plane> {
-    let vertices = double(vertices);
+fn careful_plane(vertices: [Vec3; 3], ray: LocalRay) -> Option<Plane> {
+    let vertices = double(&vertices);
     let t = triangle::plane_parameter(vertices, ray.origin, ray.direction)?;
     Some(Plane { t, normal: triangle::area_vector(vertices), grazing: true })
 }
@@ -309,14 +309,14 @@ impl Kernel for Double {
     fn test(setup: &Shear<f64>, ray: &LocalRay, vertices: &[Vec3; 3], _: f64) -> Option<Found> {
         let [a, b, c] = double(vertices);
         let w = setup.weights([a - ray.origin, b - ray.origin, c - ray.origin])?;
-        Some(careful_plane(vertices, ray)?.at(w.u as f32, w.v as f32))
+        Some(careful_plane(*vertices, *ray)?.at(w.u as f32, w.v as f32))
     }
 
     #[inline(always)]
     fn crosses(setup: &Shear<f64>, ray: &LocalRay, vertices: &[Vec3; 3], _: f64) -> Option<Found> {
         let [a, b, c] = double(vertices);
         let w = setup.crosses([a - ray.origin, b - ray.origin, c - ray.origin])?;
-        let plane = crossing(careful_plane(vertices, ray), vertices, ray, w.u, w.v);
+        let plane = crossing(careful_plane(*vertices, *ray), vertices, ray, w.u, w.v);
         Some(plane.at(w.u as f32, w.v as f32))
     }
 }

@@ -80,7 +80,7 @@ impl Extent {
 }
 
 /// A ray in an object's normalised space. Its parameter is `world t * t_scale`.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct LocalRay {
     /// The ray's own origin.
     pub(crate) origin: DVec3,

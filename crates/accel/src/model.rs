@@ -632,7 +632,7 @@ impl<'a, const SURFACES: bool, K: Kernel> OfferTriangle<'a, SURFACES, K> {
             probe.fallback();
         }
         if grazing && K::clamped(&self.setup) {
-            let Some(within) = within_triangle(self.ray, t, triangle) else { return ControlFlow::Continue(None) };
+            let Some(within) = within_triangle(*self.ray, t, *triangle) else { return ControlFlow::Continue(None) };
             t = within;
         }
         let t = t * self.ray.t_unscale;
@@ -695,11 +695,11 @@ impl<const SURFACES: bool, K: Kernel, C: Collector, P: Probe> Visit<P> for Offer
     }
 }
 
-/// [`LocalRay::within_box`] for a triangle.
+/// [`LocalRay::within_box`] for a triangle. By value, as `careful_plane`.
 #[cold]
 #[inline(never)]
-fn within_triangle(ray: &LocalRay, t: f64, vertices: &[Vec3; 3]) -> Option<f64> {
-    let [a, b, c] = double(vertices);
+fn within_triangle(ray: LocalRay, t: f64, vertices: [Vec3; 3]) -> Option<f64> {
+    let [a, b, c] = double(&vertices);
     ray.within_box(t, &Aabb::new(a.min(b).min(c), a.max(b).max(c)))
 }
 

@@ -22,6 +22,13 @@ impl Scene {
         })
     }
 
+    /// Whether the first of two hits comes before the second.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn comes_first(&self, ray: &Ray<f64>, a: Hit, b: Hit) -> bool {
+        self.order(ray, &a, &b).is_lt()
+    }
+
     #[cold]
     fn exact_order(&self, ray: &Ray<f64>, a: &Hit, b: &Hit) -> Ordering {
         let t = a.t;

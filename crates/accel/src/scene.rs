@@ -1,22 +1,19 @@
 //! The scene: built once, then only asked.
 
-use core::marker::PhantomData;
 use core::ops::{ControlFlow, Range};
 use std::sync::Arc;
 
-use firsthit_geometry::{Aabb, Precision, Ray, Real, slab::Slabs, transform::Transform};
+use firsthit_geometry::{Aabb, Precision, Ray, Real, slab::Slabs};
 use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 
 use crate::build::Topology;
 use crate::instance::{Instance, tight_boxes};
 use crate::kernel::{Double, Exact, Fast, Guarded, Kernel, Robust};
-use crate::layout::wide8::Wide8;
 use crate::layout::{Bvh2, Tree};
 use crate::local::LocalRay;
 use crate::model::{Model, PrimitiveId, Surface, limit};
 use crate::query::{Any, Closest, Collect, Collector, Dyn};
-use crate::simd::{self, Available, Lanes, Work};
 use crate::stats::{Off, Probe, Watch};
 use crate::traverse::traverse;
 use crate::{BuildError, BuildOptions, Crossings, Geometry, Guards, Hit, HitId, TraversalCounts};
@@ -47,13 +44,13 @@ pub struct Scene {
 }
 
 #[derive(Debug)]
-struct Inner {
-    options: BuildOptions,
+pub(crate) struct Inner {
+    pub(crate) options: BuildOptions,
     /// Shared with the scenes that are made of this one by moving something else.
-    models: Vec<Arc<Model>>,
+    pub(crate) models: Vec<Arc<Model>>,
     /// The mesh and transform of each instance, as given.
     placed: Vec<(usize, DAffine3)>,
-    instances: Vec<Instance>,
+    pub(crate) instances: Vec<Instance>,
     /// Over the instances with something bounded in them.
     tree: Bvh2<f64>,
     /// Instances in the order of the tree's leaves.
@@ -119,12 +116,6 @@ impl Scene {
         Ok(Self { inner: Arc::new(inner) })
     }
 
-    /// The nearest hit in the ray's closed interval; `None` also for an invalid ray.
-    #[must_use]
-    pub fn closest_hit(&self, ray: &Ray<f64>) -> Option<Hit> {
-        self.inner.by_kernel(ClosestHit { scene: self, ray })
-    }
-
     /// The nearest hit that `accept` accepts, other than on the flat primitive `source` that the ray starts from.
     ///
     /// `accept` is asked about candidates in any order, and not about all of them. Their normal is not filled in.
@@ -138,17 +129,11 @@ impl Scene {
         source: Option<HitId>,
         accept: impl FnMut(&Hit) -> bool,
     ) -> Option<Hit> {
-        let order = |a: &Hit, b: &Hit| self.order(ray, a, b);
+        let order = |a, b| self.comes_first(ray, a, b);
         let mut closest = Collect::new(ray, self.flat(source), accept, Closest { order, best: None });
         // It never breaks: the nearest hit is known at the end only.
         let _ = self.collect(ray, Crossings::Triangles, &mut closest);
         closest.take.best.map(|hit| self.finished(hit))
-    }
-
-    /// Whether anything lies in the ray's closed interval: true exactly when [`Scene::closest_hit`] finds something.
-    #[must_use]
-    pub fn any_hit(&self, ray: &Ray<f64>) -> bool {
-        self.inner.by_kernel(AnyHit { scene: self, ray })
     }
 
     /// As [`Scene::any_hit`] with a filter: see [`Scene::closest_hit_filtered`]. A filter that always says no is asked
@@ -185,6 +170,10 @@ impl Scene {
         self.inner.options
     }
 
+    pub(crate) fn inner(&self) -> &Inner {
+        &self.inner
+    }
+
     pub(crate) fn models(&self) -> &[Arc<Model>] {
         &self.inner.models
     }
@@ -199,7 +188,7 @@ impl Scene {
 
     /// [`Scene::closest_hit`] with a probe.
     pub(crate) fn closest_watched(&self, ray: &Ray<f64>, watch: &mut Watch) -> Option<Hit> {
-        let order = |a: &Hit, b: &Hit| self.order(ray, a, b);
+        let order = |a, b| self.comes_first(ray, a, b);
         let mut closest = Collect::new(ray, None, |_| true, Closest { order, best: None });
         let _ = self.collect_watched(ray, Crossings::Triangles, &mut closest, watch);
         closest.take.best.map(|hit| self.finished(hit))
@@ -256,141 +245,7 @@ impl Scene {
     }
 }
 
-/// Work that depends on the tier: the choice is made once, outside of it.
-trait ForKernel {
-    type Output;
-    fn run<K: Kernel>(self) -> Self::Output;
-}
-
-/// [`Scene::closest_hit`]: compiled for its collector alone, since it is what most rays ask.
-struct ClosestHit<'a> {
-    scene: &'a Scene,
-    ray: &'a Ray<f64>,
-}
-
-impl ForKernel for ClosestHit<'_> {
-    type Output = Option<Hit>;
-
-    #[inline(always)]
-    fn run<K: Kernel>(self) -> Option<Hit> {
-        let Self { scene, ray } = self;
-        if let Some((level, only)) = scene.inner.only() {
-            return simd::run(level, ClosestHitOf::<K> { only, scene, ray, kernel: PhantomData });
-        }
-        let order = |a: &Hit, b: &Hit| scene.order(ray, a, b);
-        let mut closest = Collect::new(ray, None, |_| true, Closest { order, best: None });
-        // It never breaks: the nearest hit is known at the end only.
-        let _ = scene.inner.trace_by::<false, K, _, _>(ray, &mut closest, &mut Off);
-        closest.take.best.map(|hit| scene.finished(hit))
-    }
-}
-
-/// [`Scene::any_hit`], likewise.
-struct AnyHit<'a> {
-    scene: &'a Scene,
-    ray: &'a Ray<f64>,
-}
-
-impl ForKernel for AnyHit<'_> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn run<K: Kernel>(self) -> bool {
-        let Self { scene, ray } = self;
-        if let Some((level, only)) = scene.inner.only() {
-            return simd::run(level, AnyHitOf::<K> { only, ray, kernel: PhantomData });
-        }
-        let mut any = Collect::new(ray, None, |_| true, Any);
-        scene.inner.trace_by::<false, K, _, _>(ray, &mut any, &mut Off).is_break()
-    }
-}
-
-/// The only instance of a scene, of a model with a wide tree: there is nothing above it to be traversed.
-#[derive(Clone, Copy)]
-struct Only<'a> {
-    model: &'a Model,
-    tree: &'a Wide8,
-    transform: &'a Transform,
-}
-
-impl Only<'_> {
-    #[inline(always)]
-    fn trace<L: Lanes, K: Kernel, C: Collector>(&self, ray: &Ray<f64>, collector: &mut C) -> ControlFlow<()> {
-        // What is not finite is found out on entering the mesh.
-        if !is_interval(ray) {
-            return ControlFlow::Continue(());
-        }
-        self.model.trace_wide::<L, false, K, C, Off>(self.tree, ray, (0, self.transform), collector, &mut Off)
-    }
-}
-
-/// [`ClosestHit`] in the only instance.
-struct ClosestHitOf<'a, K> {
-    only: Only<'a>,
-    scene: &'a Scene,
-    ray: &'a Ray<f64>,
-    kernel: PhantomData<K>,
-}
-
-impl<K: Kernel> Work for ClosestHitOf<'_, K> {
-    type Output = Option<Hit>;
-
-    #[inline(always)]
-    fn run<L: Lanes>(self) -> Option<Hit> {
-        let Self { only, scene, ray, .. } = self;
-        let order = |a: &Hit, b: &Hit| scene.order(ray, a, b);
-        let mut closest = Collect::new(ray, None, |_| true, Closest { order, best: None });
-        let _ = only.trace::<L, K, _>(ray, &mut closest);
-        let hit = closest.take.best?;
-        Some(Hit { normal: only.transform.normal(hit.normal), ..hit })
-    }
-}
-
-/// [`AnyHit`] in the only instance.
-struct AnyHitOf<'a, K> {
-    only: Only<'a>,
-    ray: &'a Ray<f64>,
-    kernel: PhantomData<K>,
-}
-
-impl<K: Kernel> Work for AnyHitOf<'_, K> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn run<L: Lanes>(self) -> bool {
-        let mut any = Collect::new(self.ray, None, |_| true, Any);
-        self.only.trace::<L, K, _>(self.ray, &mut any).is_break()
-    }
-}
-
-/// Whether the ray's interval has anything in it; false for NaN.
-#[inline(always)]
-fn is_interval(ray: &Ray<f64>) -> bool {
-    ray.t_min <= ray.t_max
-}
-
 impl Inner {
-    #[inline(always)]
-    fn by_kernel<W: ForKernel>(&self, work: W) -> W::Output {
-        match self.options.precision {
-            Precision::Fast => work.run::<Fast>(),
-            Precision::Robust if self.options.guards.contains(Guards::ALL.difference(Guards::OFFSET)) => {
-                work.run::<Robust>()
-            }
-            Precision::Robust => work.run::<Guarded>(),
-            Precision::Double => work.run::<Double>(),
-            Precision::Exact => work.run::<Exact>(),
-        }
-    }
-
-    #[inline(always)]
-    fn only(&self) -> Option<(Available, Only<'_>)> {
-        let [instance] = &self.instances[..] else { return None };
-        let model = &self.models[instance.model as usize];
-        let (tree, level) = model.wide()?;
-        Some((level, Only { model, tree, transform: &instance.transform }))
-    }
-
     /// Offers hits to the collector, by the tests of the scene's tier.
     fn trace<const SURFACES: bool, C: Collector, P: Probe>(
         &self,
@@ -409,7 +264,7 @@ impl Inner {
         }
     }
 
-    fn trace_by<const SURFACES: bool, K: Kernel, C: Collector, P: Probe>(
+    pub(crate) fn trace_by<const SURFACES: bool, K: Kernel, C: Collector, P: Probe>(
         &self,
         ray: &Ray<f64>,
         collector: &mut C,
@@ -477,6 +332,12 @@ impl Inner {
             degenerate_triangles: self.models.iter().map(|m| m.degenerate()).sum(),
         }
     }
+}
+
+/// Whether the ray's interval has anything in it; false for NaN.
+#[inline(always)]
+pub(crate) fn is_interval(ray: &Ray<f64>) -> bool {
+    ray.t_min <= ray.t_max
 }
 
 /// Boxes as the builder wants them: f32, about the middle of all and of size near 1. Only the tree's shape comes from

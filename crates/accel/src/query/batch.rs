@@ -1,4 +1,4 @@
-//! Many rays at once.
+//! Many rays on many threads.
 
 use firsthit_geometry::Ray;
 use rayon::prelude::*;
@@ -9,23 +9,9 @@ use crate::{Hit, Scene};
 pub(super) const CHUNK: usize = 1024;
 
 impl Scene {
-    /// [`Scene::closest_hit`] for each ray, into the slot of the same index. The shorter slice decides how many.
-    pub fn closest_hits(&self, rays: &[Ray<f64>], hits: &mut [Option<Hit>]) {
-        for (ray, hit) in rays.iter().zip(hits) {
-            *hit = self.closest_hit(ray);
-        }
-    }
-
     /// As [`Scene::closest_hits`], on the threads of the rayon pool it is called from. The same bits for any number.
     pub fn par_closest_hits(&self, rays: &[Ray<f64>], hits: &mut [Option<Hit>]) {
         rays.par_chunks(CHUNK).zip(hits.par_chunks_mut(CHUNK)).for_each(|(r, h)| self.closest_hits(r, h));
-    }
-
-    /// [`Scene::any_hit`] for each ray, into the slot of the same index. The shorter slice decides how many.
-    pub fn any_hits(&self, rays: &[Ray<f64>], hits: &mut [bool]) {
-        for (ray, hit) in rays.iter().zip(hits) {
-            *hit = self.any_hit(ray);
-        }
     }
 
     /// As [`Scene::any_hits`], on the threads of the rayon pool it is called from.

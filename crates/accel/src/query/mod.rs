@@ -7,6 +7,7 @@ mod closest_hit;
 mod count_hits;
 mod crossings;
 mod decision;
+mod direct;
 
 use core::ops::ControlFlow;
 

@@ -78,21 +78,40 @@ impl Stack<u64> {
         if reversed { !nearest } else { nearest }
     }
 
-    #[inline(never)]
-    fn push_many(&mut self, mut keys: [u64; 8], n: usize, reversed: bool) -> u64 {
-        let keys = &mut keys[..n.min(8)];
-        for i in 1..keys.len() {
-            let key = keys[i];
-            let mut k = i;
-            while k > 0 && keys[k - 1] < key {
-                keys[k] = keys[k - 1];
+    /// Any number. Inlined too: a call would make the caller keep everything in memory.
+    #[inline(always)]
+    fn push_many(&mut self, keys: [u64; 8], n: usize, reversed: bool) -> u64 {
+        assert!(self.len + 8 <= SIZE, "trees are not so deep");
+        let slots = &mut self.entries[self.len..self.len + 8];
+        // Insertion, the largest lowest.
+        let mut count = 0;
+        while count < n.min(8) {
+            let key = keys[count];
+            let mut k = count;
+            while k > 0 {
+                // SAFETY: the slots below `count` were written by earlier turns.
+                let below = unsafe { slots[k - 1].assume_init() };
+                if below >= key {
+                    break;
+                }
+                slots[k].write(below);
                 k -= 1;
             }
-            keys[k] = key;
+            slots[k].write(key);
+            count += 1;
         }
-        let Some((nearest, rest)) = keys.split_last() else { return 0 };
-        rest.iter().for_each(|k| self.put([*k], reversed));
-        *nearest
+        if reversed {
+            for slot in &mut slots[..count] {
+                // SAFETY: the slots below `count` are written.
+                slot.write(!unsafe { slot.assume_init() });
+            }
+        }
+        self.len += count;
+        match self.pop() {
+            Some(nearest) if reversed => !nearest,
+            Some(nearest) => nearest,
+            None => 0,
+        }
     }
 
     #[inline(always)]

@@ -1,0 +1,274 @@
+//! Closest and any hit, compiled for their collectors alone: they are what most rays ask. The tier and the
+//! instructions are chosen outside, once for each call.
+
+use core::marker::PhantomData;
+use core::ops::ControlFlow;
+
+use firsthit_geometry::{Precision, Ray, transform::Transform};
+
+use super::{Any, Closest, Collect, Collector};
+use crate::kernel::{Double, Exact, Fast, Guarded, Kernel, Robust};
+use crate::layout::wide8::Wide8;
+use crate::model::Model;
+use crate::scene::{Inner, is_interval};
+use crate::simd::{self, Available, Lanes, Work};
+use crate::stats::Off;
+use crate::{Guards, Hit, Scene};
+
+impl Scene {
+    /// The nearest hit in the ray's closed interval; `None` also for an invalid ray.
+    #[must_use]
+    pub fn closest_hit(&self, ray: &Ray<f64>) -> Option<Hit> {
+        self.inner().by_kernel(ClosestHit { scene: self, ray })
+    }
+
+    /// [`Scene::closest_hit`] for each ray, into the slot of the same index. The shorter slice decides how many.
+    pub fn closest_hits(&self, rays: &[Ray<f64>], hits: &mut [Option<Hit>]) {
+        self.inner().by_kernel(ClosestHits { scene: self, rays, hits });
+    }
+
+    /// Whether anything lies in the ray's closed interval: true exactly when [`Scene::closest_hit`] finds something.
+    #[must_use]
+    pub fn any_hit(&self, ray: &Ray<f64>) -> bool {
+        self.inner().by_kernel(AnyHit { scene: self, ray })
+    }
+
+    /// [`Scene::any_hit`] for each ray, into the slot of the same index. The shorter slice decides how many.
+    pub fn any_hits(&self, rays: &[Ray<f64>], hits: &mut [bool]) {
+        self.inner().by_kernel(AnyHits { scene: self, rays, hits });
+    }
+}
+
+/// Work that depends on the tier: the choice is made once, outside of it.
+trait ForKernel {
+    type Output;
+    fn run<K: Kernel>(self) -> Self::Output;
+}
+
+/// [`Scene::closest_hit`].
+struct ClosestHit<'a> {
+    scene: &'a Scene,
+    ray: &'a Ray<f64>,
+}
+
+impl ForKernel for ClosestHit<'_> {
+    type Output = Option<Hit>;
+
+    #[inline(always)]
+    fn run<K: Kernel>(self) -> Option<Hit> {
+        let Self { scene, ray } = self;
+        if let Some((level, only)) = scene.inner().only() {
+            return simd::run(level, ClosestHitOf::<K> { only, scene, ray, kernel: PhantomData });
+        }
+        closest::<K>(scene, ray)
+    }
+}
+
+/// [`Scene::any_hit`].
+struct AnyHit<'a> {
+    scene: &'a Scene,
+    ray: &'a Ray<f64>,
+}
+
+impl ForKernel for AnyHit<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<K: Kernel>(self) -> bool {
+        let Self { scene, ray } = self;
+        if let Some((level, only)) = scene.inner().only() {
+            return simd::run(level, AnyHitOf::<K> { only, ray, kernel: PhantomData });
+        }
+        any::<K>(scene, ray)
+    }
+}
+
+/// In any scene.
+fn closest<K: Kernel>(scene: &Scene, ray: &Ray<f64>) -> Option<Hit> {
+    let order = |a, b| scene.comes_first(ray, a, b);
+    let mut closest = Collect::new(ray, None, |_| true, Closest { order, best: None });
+    // It never breaks: the nearest hit is known at the end only.
+    let _ = scene.inner().trace_by::<false, K, _, _>(ray, &mut closest, &mut Off);
+    closest.take.best.map(|hit| scene.finished(hit))
+}
+
+/// In any scene.
+fn any<K: Kernel>(scene: &Scene, ray: &Ray<f64>) -> bool {
+    let mut any = Collect::new(ray, None, |_| true, Any);
+    scene.inner().trace_by::<false, K, _, _>(ray, &mut any, &mut Off).is_break()
+}
+
+/// [`Scene::closest_hits`]: the choice of instructions is made once for all of them.
+struct ClosestHits<'a> {
+    scene: &'a Scene,
+    rays: &'a [Ray<f64>],
+    hits: &'a mut [Option<Hit>],
+}
+
+impl ForKernel for ClosestHits<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<K: Kernel>(self) {
+        let Self { scene, rays, hits } = self;
+        if let Some((level, only)) = scene.inner().only() {
+            return simd::run(level, ClosestHitsOf::<K> { only, scene, rays, hits, kernel: PhantomData });
+        }
+        for (ray, hit) in rays.iter().zip(hits) {
+            *hit = closest::<K>(scene, ray);
+        }
+    }
+}
+
+/// [`Scene::any_hits`], likewise.
+struct AnyHits<'a> {
+    scene: &'a Scene,
+    rays: &'a [Ray<f64>],
+    hits: &'a mut [bool],
+}
+
+impl ForKernel for AnyHits<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<K: Kernel>(self) {
+        let Self { scene, rays, hits } = self;
+        if let Some((level, only)) = scene.inner().only() {
+            return simd::run(level, AnyHitsOf::<K> { only, rays, hits, kernel: PhantomData });
+        }
+        for (ray, hit) in rays.iter().zip(hits) {
+            *hit = any::<K>(scene, ray);
+        }
+    }
+}
+
+/// The only instance of a scene, of a model with a wide tree: there is nothing above it to be traversed.
+#[derive(Clone, Copy)]
+struct Only<'a> {
+    model: &'a Model,
+    tree: &'a Wide8,
+    transform: &'a Transform,
+}
+
+impl Only<'_> {
+    #[inline(always)]
+    fn trace<L: Lanes, K: Kernel, C: Collector>(&self, ray: &Ray<f64>, collector: &mut C) -> ControlFlow<()> {
+        // What is not finite is found out on entering the mesh.
+        if !is_interval(ray) {
+            return ControlFlow::Continue(());
+        }
+        self.model.trace_wide::<L, false, K, C, Off>(self.tree, ray, (0, self.transform), collector, &mut Off)
+    }
+
+    #[inline(always)]
+    fn closest<L: Lanes, K: Kernel>(&self, scene: &Scene, ray: &Ray<f64>) -> Option<Hit> {
+        let order = |a, b| scene.comes_first(ray, a, b);
+        let mut closest = Collect::new(ray, None, |_| true, Closest { order, best: None });
+        let _ = self.trace::<L, K, _>(ray, &mut closest);
+        let hit = closest.take.best?;
+        Some(Hit { normal: self.transform.normal(hit.normal), ..hit })
+    }
+
+    #[inline(always)]
+    fn any<L: Lanes, K: Kernel>(&self, ray: &Ray<f64>) -> bool {
+        let mut any = Collect::new(ray, None, |_| true, Any);
+        self.trace::<L, K, _>(ray, &mut any).is_break()
+    }
+}
+
+/// [`ClosestHit`] in the only instance.
+struct ClosestHitOf<'a, K> {
+    only: Only<'a>,
+    scene: &'a Scene,
+    ray: &'a Ray<f64>,
+    kernel: PhantomData<K>,
+}
+
+impl<K: Kernel> Work for ClosestHitOf<'_, K> {
+    type Output = Option<Hit>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Option<Hit> {
+        self.only.closest::<L, K>(self.scene, self.ray)
+    }
+}
+
+/// [`AnyHit`] in the only instance.
+struct AnyHitOf<'a, K> {
+    only: Only<'a>,
+    ray: &'a Ray<f64>,
+    kernel: PhantomData<K>,
+}
+
+impl<K: Kernel> Work for AnyHitOf<'_, K> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> bool {
+        self.only.any::<L, K>(self.ray)
+    }
+}
+
+/// [`ClosestHits`] in the only instance.
+struct ClosestHitsOf<'a, K> {
+    only: Only<'a>,
+    scene: &'a Scene,
+    rays: &'a [Ray<f64>],
+    hits: &'a mut [Option<Hit>],
+    kernel: PhantomData<K>,
+}
+
+impl<K: Kernel> Work for ClosestHitsOf<'_, K> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let Self { only, scene, rays, hits, .. } = self;
+        for (ray, hit) in rays.iter().zip(hits) {
+            *hit = only.closest::<L, K>(scene, ray);
+        }
+    }
+}
+
+/// [`AnyHits`] in the only instance.
+struct AnyHitsOf<'a, K> {
+    only: Only<'a>,
+    rays: &'a [Ray<f64>],
+    hits: &'a mut [bool],
+    kernel: PhantomData<K>,
+}
+
+impl<K: Kernel> Work for AnyHitsOf<'_, K> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let Self { only, rays, hits, .. } = self;
+        for (ray, hit) in rays.iter().zip(hits) {
+            *hit = only.any::<L, K>(ray);
+        }
+    }
+}
+
+impl Inner {
+    #[inline(always)]
+    fn by_kernel<W: ForKernel>(&self, work: W) -> W::Output {
+        match self.options.precision {
+            Precision::Fast => work.run::<Fast>(),
+            Precision::Robust if self.options.guards.contains(Guards::ALL.difference(Guards::OFFSET)) => {
+                work.run::<Robust>()
+            }
+            Precision::Robust => work.run::<Guarded>(),
+            Precision::Double => work.run::<Double>(),
+            Precision::Exact => work.run::<Exact>(),
+        }
+    }
+
+    #[inline(always)]
+    fn only(&self) -> Option<(Available, Only<'_>)> {
+        let [instance] = &self.instances[..] else { return None };
+        let model = &self.models[instance.model as usize];
+        let (tree, level) = model.wide()?;
+        Some((level, Only { model, tree, transform: &instance.transform }))
+    }
+}
