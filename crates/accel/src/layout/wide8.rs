@@ -395,7 +395,7 @@ mod tests {
             assert_eq!(triangles.get(p as usize).copied(), (!t[0].x.is_nan()).then_some(t));
         }
         // Boxes of children hold what lies below.
-        fn below(tree: &Wide8, order: &[u32], r: Reference) -> Aabb<f32> {
+        fn below(tree: &Wide8, r: Reference) -> Aabb<f32> {
             if r.is_leaf() {
                 let used = (0..8).filter(|k| r.lanes() >> k & 1 == 1).map(|k| r.block() * 4 + k);
                 return Aabb::from_points(used.flat_map(|k| tree.triangle(k).unwrap()));
@@ -405,13 +405,13 @@ mod tests {
             for k in (0..8).filter(|&k| node.children[k] != u32::MAX) {
                 let p = node.planes.map(|p| p[k]);
                 let b = Aabb::new(Vec3::new(p[0], p[2], p[4]), Vec3::new(p[1], p[3], p[5]));
-                assert_eq!(b, below(tree, order, Reference(node.children[k])));
+                assert_eq!(b, below(tree, Reference(node.children[k])));
                 all = all.union(b);
             }
             all
         }
         if tree.root != Reference::NOTHING {
-            below(&tree, &order, tree.root);
+            below(&tree, tree.root);
         }
         let again = tree.refit(&order, triangles, &boxes);
         assert!(tree.nodes.iter().zip(&again.nodes).all(|(a, b)| a.planes == b.planes));
