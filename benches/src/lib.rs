@@ -1,6 +1,6 @@
 //! Benches of firsthit, and the peers that it is measured against on the same rays.
 //!
-//! * `cargo bench -p firsthit-benches`: criterion benches of traversal (`benches/benches/`).
+//! * `cargo bench -p firsthit-benches`: criterion benches of kernels, queries, builds and traversal (`benches/benches/`).
 //! * `cargo run --release -p firsthit-benches --bin peers`: speed, memory, build time and wrong answers, firsthit beside
 //!   its peers.
 //! * `cargo run --release -p firsthit-benches --bin leaks`: rays lost through closed meshes, firsthit beside its peers.
@@ -16,4 +16,5 @@ pub mod random;
 pub mod rays;
 pub mod record;
 pub mod reference;
+pub mod small;
 pub mod summary;

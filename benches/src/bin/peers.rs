@@ -21,7 +21,7 @@ static ALLOCATOR: Counting = Counting;
 
 const AFTER: &str = "\
 Embree takes part where the environment variable EMBREE_LIB names a libembree4; tinybvh with --features tinybvh.
-FIRSTHIT_SIMD=scalar|avx2 forces the level of firsthit's instructions.
+FIRSTHIT_SIMD=scalar|avx2|avx512 forces the level of firsthit's instructions.
 
 On a machine that others use too, believe the best of the repetitions, and ratios within one run only:
   taskset -c 1 target/release/peers --reps 7 forest bunny.obj --engines firsthit-robust,embree-robust";

@@ -17,9 +17,10 @@ Examples:
   firsthit bench dragon.glb sponza.obj --html bench.html
       The same of two models, with a page of bars and charts.
   firsthit bench dragon.glb --precision robust --build fast,balanced,high --rays diffuse
-  firsthit bench dragon.glb --layout wide8 --simd scalar,avx2 --json
+  firsthit bench dragon.glb --layout wide8 --simd scalar,avx2,avx512 --json
 
-The environment variable FIRSTHIT_SIMD forces the level of instructions in all commands; --simd wins over it.
+The environment variable FIRSTHIT_SIMD forces the level of instructions, here and in render, inspect and accuracy MODEL;
+--simd wins over it.
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted (what was measured so far is printed).";
 
@@ -47,7 +48,7 @@ pub(crate) struct BenchArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub(crate) precision: Vec<Precision>,
 
-    /// Which instructions queries may use, comma-separated: scalar, avx2 [default: the best there are]
+    /// Which instructions queries may use, comma-separated: scalar, avx2, avx512 [default: the best there are]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub(crate) simd: Vec<Level>,
 
