@@ -55,7 +55,8 @@ impl Record {
             version: env!("CARGO_PKG_VERSION").into(),
             commit: if changed { commit + "+" } else { commit },
             cpu: cpu.unwrap_or_else(|| "unknown".into()),
-            cores: std::thread::available_parallelism().map_or(1, Into::into),
+            // All there are, not only those that this process is bound to.
+            cores: cpus.lines().filter(|l| l.starts_with("processor")).count(),
             os: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
             rustc: output(Command::new("rustc").arg("-V")),
             compiled_for: if cfg!(target_feature = "avx2") { "avx2".into() } else { String::new() },

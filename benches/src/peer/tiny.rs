@@ -1,6 +1,8 @@
 //! tinybvh through the crate tinybvh-rs, which compiles it for the processor at hand. Its fastest tree, of eight children,
-//! is offered only where Rust too is compiled for AVX2 (`RUSTFLAGS="-C target-cpu=native"`); otherwise this is its binary
-//! tree with spatial splits. The crate has no query for any hit: that is a closest hit within the interval.
+//! is offered only where Rust too is compiled for AVX2 (`RUSTFLAGS="-C target-cpu=native"`). Otherwise this is its binary
+//! tree, which through this crate gives wrong answers on some meshes: to 18 % of the primary rays at a scan of 69,451
+//! triangles, with spatial splits and without, but to none at a room of 66,450; the column of wrong answers tells. The
+//! crate has no query for any hit: that is a closest hit within the interval.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -59,9 +61,7 @@ fn build(corners: &'static [[f32; 4]]) -> Result<Tree, tinybvh_rs::Error> {
 
 #[cfg(not(target_feature = "avx2"))]
 fn build(corners: &'static [[f32; 4]]) -> Result<Tree, tinybvh_rs::Error> {
-    let mut binary = Tree::new_hq(corners.into())?;
-    binary.compact();
-    Ok(binary)
+    Tree::new(corners.into())
 }
 
 /// Bytes that C's allocator has given out, to Rust and C++.
