@@ -46,7 +46,10 @@ pub(crate) fn tight_boxes(instances: &[Instance], models: &[Arc<Model>]) -> Vec<
         .par_iter()
         .map(|i| {
             let model = &models[i.model as usize];
-            if all <= TIGHT {
+            if i.transform.is_uniform() && !model.bounds().is_empty() && !model.has_shapes() {
+                // Each axis is mapped by itself, so the corners tell.
+                Aabb::from_points(model.bounds().corners().map(|p| i.transform.point(p)))
+            } else if all <= TIGHT {
                 Aabb::from_points(model.extremes().map(|p| i.transform.point(p)))
             } else {
                 i.transform.aabb(model.bounds())

@@ -8,6 +8,7 @@ use firsthit_geometry::{
     Aabb, Precision, Primitive, Ray, Real, Shape, SurfaceHit, exact::Root, transform::Transform, triangle,
 };
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 use crate::build::Topology;
 use crate::kernel::{Found, Kernel, double};
@@ -136,9 +137,9 @@ impl Model {
             guards: options.guards,
         };
         // Everything in file order first.
-        let mut triangles = Vec::new();
+        let mut triangles: Vec<[Vec3; 3]> = Vec::new();
         let mut boxes = Vec::new();
-        let mut numbers = Vec::new();
+        let mut numbers: Vec<u32> = Vec::new();
         let mut first = 0;
         for (g, geometry) in geometries.iter().enumerate() {
             let g = g as u32;
@@ -146,22 +147,29 @@ impl Model {
             match geometry {
                 Geometry::Triangles { positions, triangles: indices } => {
                     model.places.push(Places::Triangles(vec![u32::MAX; indices.len()]));
-                    for (k, t) in indices.iter().enumerate() {
-                        let vertices = t.map(|i| normalised(positions[i as usize]));
-                        if triangle::area_vector(vertices.map(|v| v.as_dvec3())) == DVec3::ZERO {
-                            model.degenerate += 1;
-                            // Never hit, so in no tree. But when seen with rounded vertices, one of three vertices in a
-                            // line lies beside the others: it closes the gap that its neighbours leave, so it is
-                            // counted when crossings of a surface are.
-                            let [a, b, c] = vertices;
-                            if a == b || b == c || c == a || options.precision == Precision::Fast {
-                                continue;
-                            }
-                        }
-                        triangles.push(vertices);
-                        boxes.push(Aabb::from_points(vertices));
-                        numbers.push(first + k as u32);
-                    }
+                    let positions: Vec<Vec3> = positions.par_iter().map(|p| normalised(*p)).collect();
+                    let corners = |t: &[u32; 3]| t.map(|i| positions[i as usize]);
+                    let flat: Vec<u32> = (0..indices.len() as u32)
+                        .into_par_iter()
+                        .filter(|&k| has_no_area(corners(&indices[k as usize])))
+                        .collect();
+                    model.degenerate += flat.len() as u64;
+                    // Never hit, so in no tree. But when seen with rounded vertices, one of three vertices in a line
+                    // lies beside the others: it closes the gap that its neighbours leave, so it is counted when
+                    // crossings of a surface are.
+                    let left_out: Vec<u32> = flat
+                        .into_iter()
+                        .filter(|&k| {
+                            let [a, b, c] = corners(&indices[k as usize]);
+                            a == b || b == c || c == a || options.precision == Precision::Fast
+                        })
+                        .collect();
+                    let kept = |k: &u32| left_out.is_empty() || left_out.binary_search(k).is_err();
+                    let before = numbers.len();
+                    numbers.extend((0..indices.len() as u32).filter(kept).map(|k| first + k));
+                    let new = &numbers[before..];
+                    triangles.par_extend(new.par_iter().map(|n| corners(&indices[(n - first) as usize])));
+                    boxes.par_extend(triangles[before..].par_iter().map(|t| Aabb::from_points(*t)));
                     first += indices.len() as u32;
                 }
                 Geometry::Shape(shape) => {
@@ -289,6 +297,9 @@ impl Model {
     }
     pub(crate) fn degenerate(&self) -> u64 {
         self.degenerate
+    }
+    pub(crate) fn has_shapes(&self) -> bool {
+        !self.shapes.is_empty()
     }
     pub(crate) fn has_unbounded(&self) -> bool {
         !self.unbounded.is_empty()
@@ -710,6 +721,15 @@ fn shape_hit(shape: &Shape<f64>, ray: &Ray<f64>, precision: Precision) -> Option
         Precision::Robust | Precision::Double => shape.closest_hit(ray),
         Precision::Exact => shape.closest_hit_exact(ray),
     }
+}
+
+/// Whether three points lie in a line, as [`triangle::area_vector`] tells; mostly without it.
+fn has_no_area(vertices: [Vec3; 3]) -> bool {
+    let [a, b, c] = double(&vertices);
+    let (e1, e2) = (b - a, c - a);
+    // Far more than what is rounded here: with an angle like this, no way to compute it gives 0.
+    let certainly = e1.cross(e2).length_squared() > 1e-20 * (e1.length_squared() * e2.length_squared());
+    !certainly && triangle::area_vector([a, b, c]) == DVec3::ZERO
 }
 
 /// Boxes for the builder, whose areas must not overflow: only the shape of the tree comes from them.

@@ -85,6 +85,12 @@ impl Transform {
         self.linear
     }
 
+    /// Whether the linear part is a multiple of the identity.
+    #[must_use]
+    pub fn is_uniform(&self) -> bool {
+        self.uniform
+    }
+
     /// The inverse of the linear part.
     #[must_use]
     pub fn inverse_linear(&self) -> DMat3 {

@@ -14,6 +14,7 @@ use std::borrow::Cow;
 use firsthit_geometry::Aabb;
 use glam::Vec3;
 use obvhs::{BvhBuildParams, bvh2::builder::build_bvh2};
+use rayon::prelude::*;
 
 use crate::BuildQuality;
 
@@ -75,7 +76,7 @@ impl Topology {
         let boxes = &*tame(boxes);
         if !stall::stalls(boxes) {
             let items: Vec<obvhs::aabb::Aabb> =
-                boxes.iter().map(|b| obvhs::aabb::Aabb::new(b.min.into(), b.max.into())).collect();
+                boxes.par_iter().map(|b| obvhs::aabb::Aabb::new(b.min.into(), b.max.into())).collect();
             let bvh = build_bvh2(&items, parameters, &mut core::time::Duration::default());
             return emit::bounded(emit::copy(&bvh), boxes);
         }

@@ -7,6 +7,7 @@
 
 use firsthit_geometry::Aabb;
 use glam::Vec3;
+use rayon::prelude::*;
 
 /// Fewer boxes than this may be joined as slowly as they like.
 const HARMLESS: usize = 1024;
@@ -56,15 +57,15 @@ fn sorted(boxes: &[Aabb<f32>]) -> Vec<Aabb<f32>> {
     let all = boxes.iter().fold(Aabb::empty(), |a, b| a.union(*b));
     let scale = Vec3::from(all.extent().to_array().map(|e| if e > 0.0 { (1 << 21) as f32 / e } else { 0.0 }));
     let mut keys: Vec<(u64, u32)> = boxes
-        .iter()
+        .par_iter()
         .enumerate()
         .map(|(i, b)| {
             let cell = ((b.center() - all.min) * scale).as_uvec3().min(glam::UVec3::splat((1 << 21) - 1));
             (spread(cell.x) | spread(cell.y) << 1 | spread(cell.z) << 2, i as u32)
         })
         .collect();
-    keys.sort_unstable();
-    keys.into_iter().map(|(_, i)| boxes[i as usize]).collect()
+    keys.par_sort_unstable();
+    keys.into_par_iter().map(|(_, i)| boxes[i as usize]).collect()
 }
 
 /// Two zero bits between each two of the low 21 bits.

@@ -4,6 +4,7 @@
 //! question: which children of a node does a ray meet, and where? The traversal is written once, over that.
 
 mod bvh2;
+mod collapse;
 pub(crate) mod wide8;
 
 pub(crate) use bvh2::Bvh2;

@@ -3,16 +3,12 @@
 //! Triangles lie in blocks of four. A leaf is a run of up to eight of them that reaches into two blocks at most, so
 //! neighbouring leaves may share a block and few lanes are empty.
 //!
-//! Made from the binary tree by dynamic programming over its nodes, as Wald, Benthin and Boulos, "Getting Rid of
-//! Packets" (2008) and Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide
-//! BVHs" (HPG 2017) describe: the least expected number of nodes and blocks that a random line meets.
+//! How it is made from the binary tree is told in [`super::collapse`].
 
 use core::ops::Range;
 
 use firsthit_geometry::Aabb;
 use glam::Vec3;
-
-use crate::build::{Child, Topology};
 
 /// A tree of eight children a node.
 #[derive(Clone, Debug)]
@@ -21,8 +17,14 @@ pub(crate) struct Wide8 {
     pub(crate) root: Reference,
     pub(crate) nodes: Vec<Node>,
     pub(crate) blocks: Vec<Block>,
-    depth: u32,
-    sah_cost: f64,
+    pub(super) depth: u32,
+    pub(super) sah_cost: f64,
+}
+
+impl Default for Wide8 {
+    fn default() -> Self {
+        Self { root: Reference::NOTHING, nodes: Vec::new(), blocks: Vec::new(), depth: 0, sah_cost: 0.0 }
+    }
 }
 
 /// A node, or a leaf: from the highest bit, whether it is one, number of triangles less one (3 bits), lane of the first
@@ -34,11 +36,19 @@ impl Reference {
     pub(crate) const NOTHING: Self = Self(u32::MAX);
     const LEAF: u32 = 1 << 31;
 
-    fn node(index: usize) -> Self {
+    pub(super) fn node(index: usize) -> Self {
         Self(index as u32)
     }
-    fn leaf(place: usize, count: usize) -> Self {
+    pub(super) fn leaf(place: usize, count: usize) -> Self {
         Self(Self::LEAF | (count as u32 - 1) << 28 | (place as u32 & 3) << 26 | (place / 4) as u32)
+    }
+    /// The same after so many nodes or blocks more.
+    pub(super) fn moved(self, nodes: u32, blocks: u32) -> Self {
+        match self {
+            Self::NOTHING => self,
+            _ if self.is_leaf() => Self(self.0 + blocks),
+            _ => Self(self.0 + nodes),
+        }
     }
     #[inline(always)]
     pub(crate) fn is_leaf(self) -> bool {
@@ -118,9 +128,9 @@ impl Node {
 pub(crate) struct Block(pub(crate) [[[f32; 4]; 3]; 3]);
 
 impl Block {
-    const EMPTY: Self = Self([[[f32::NAN; 4]; 3]; 3]);
+    pub(super) const EMPTY: Self = Self([[[f32::NAN; 4]; 3]; 3]);
 
-    fn set_triangle(&mut self, lane: usize, triangle: [Vec3; 3]) {
+    pub(super) fn set_triangle(&mut self, lane: usize, triangle: [Vec3; 3]) {
         for (vertex, p) in triangle.iter().enumerate() {
             for axis in 0..3 {
                 self.0[vertex][axis][lane] = p[axis];
@@ -140,55 +150,12 @@ impl Block {
     }
 }
 
-/// Triangles in a leaf at most.
-const LEAF: u32 = 8;
-
 /// Cost of testing a leaf against that of a node. Its triangles are tested at once, so it is the memory that counts.
-fn leaf_cost(count: u32) -> f32 {
+pub(super) fn leaf_cost(count: u32) -> f32 {
     if count <= 4 { 0.9 } else { 1.0 }
 }
 
-/// What the dynamic programme knows of a binary node: the least cost of showing what lies below as at most `i + 1`
-/// children, and how.
-#[derive(Clone, Copy)]
-struct Plan {
-    cost: [f32; 8],
-    /// How many of the `i + 1` children go to the left; 0 where one fewer child is no worse (for `i = 0`: a leaf).
-    left: [u8; 8],
-}
-
-struct Collapse<'a> {
-    topology: &'a Topology,
-    boxes: Vec<Aabb<f32>>,
-    counts: Vec<u32>,
-    plans: Vec<Plan>,
-    primitives: &'a [Aabb<f32>],
-}
-
 impl Wide8 {
-    /// Collapses a binary tree whose leaves hold one primitive each (or few).
-    ///
-    /// Tells also which triangle is in each lane of each block; `u32::MAX` stands for none.
-    pub(crate) fn new(topology: &Topology, triangles: &[[Vec3; 3]], boxes: &[Aabb<f32>]) -> (Self, Vec<u32>) {
-        let collapse = Collapse::new(topology, boxes);
-        let mut tree =
-            Self { root: Reference::NOTHING, nodes: Vec::new(), blocks: Vec::new(), depth: 0, sah_cost: 0.0 };
-        let mut order = Vec::new();
-        // A leaf of one triangle may waste three lanes, but not all do.
-        tree.blocks.reserve(triangles.len() / 3);
-        tree.nodes.reserve(triangles.len() / 16);
-        if let Some(root) = topology.root {
-            tree.root = tree.emit(&collapse, root, triangles, 1, &mut order);
-            // Two blocks are read for any leaf.
-            tree.blocks.push(Block::EMPTY);
-            order.resize(tree.blocks.len() * 4, u32::MAX);
-            let whole = f64::from(collapse.bounds(root).area());
-            let plan = collapse.plan(root);
-            tree.sah_cost = if whole > 0.0 { f64::from(plan.cost[0]) / whole } else { 1.0 };
-        }
-        (tree, order)
-    }
-
     /// A tree of the same shape over triangles in this order of the lanes; `u32::MAX` stands for a lane with nothing.
     pub(crate) fn refit(&self, order: &[u32], triangles: &[[Vec3; 3]], boxes: &[Aabb<f32>]) -> Self {
         let mut tree = self.clone();
@@ -243,144 +210,13 @@ impl Wide8 {
     pub(crate) fn triangle(&self, place: usize) -> Option<[Vec3; 3]> {
         self.blocks.get(place / 4).map(|b| b.triangle(place % 4))
     }
-
-    /// Writes the subtree and says where it is. Recursion is as deep as the tree, which is bounded.
-    fn emit(
-        &mut self,
-        c: &Collapse<'_>,
-        at: Child,
-        triangles: &[[Vec3; 3]],
-        depth: u32,
-        order: &mut Vec<u32>,
-    ) -> Reference {
-        self.depth = self.depth.max(depth);
-        if at.is_leaf() || c.plan(at).left[0] == 0 {
-            let (first, count) = c.run(at);
-            return self.emit_leaf(&c.topology.order[first as usize..(first + count) as usize], triangles, order);
-        }
-        let mut children = Vec::with_capacity(8);
-        let [l, r] = c.topology.nodes[at.first as usize];
-        let split = c.plan(at).left[0];
-        c.gather(l, split, &mut children);
-        c.gather(r, 8 - split, &mut children);
-        children.sort_by(|a, b| c.bounds(*a).area().total_cmp(&c.bounds(*b).area()));
-
-        let index = self.nodes.len();
-        self.nodes.push(Node::EMPTY);
-        for (k, child) in children.into_iter().enumerate() {
-            self.nodes[index].set_box(k, &c.bounds(child));
-            let reference = self.emit(c, child, triangles, depth + 1, order);
-            self.nodes[index].children[k] = reference.0;
-        }
-        Reference::node(index)
-    }
-
-    /// Appends up to eight triangles. `order` has as many entries as there are lanes in use.
-    fn emit_leaf(&mut self, run: &[u32], triangles: &[[Vec3; 3]], order: &mut Vec<u32>) -> Reference {
-        let room = if run.len() <= 4 { 4 } else { 8 };
-        if order.len() % 4 + run.len() > room {
-            order.resize(order.len().next_multiple_of(4), u32::MAX);
-        }
-        let first = order.len();
-        for &primitive in run {
-            let (block, lane) = (order.len() / 4, order.len() % 4);
-            if lane == 0 {
-                self.blocks.push(Block::EMPTY);
-            }
-            self.blocks[block].set_triangle(lane, triangles[primitive as usize]);
-            order.push(primitive);
-        }
-        Reference::leaf(first, run.len())
-    }
-}
-
-impl<'a> Collapse<'a> {
-    fn new(topology: &'a Topology, primitives: &'a [Aabb<f32>]) -> Self {
-        let n = topology.nodes.len();
-        let plan = Plan { cost: [f32::INFINITY; 8], left: [0; 8] };
-        let (boxes, counts) = (vec![Aabb::empty(); n], vec![0; n]);
-        let mut c = Self { topology, boxes, counts, plans: vec![plan; n], primitives };
-        for i in (0..n).rev() {
-            let [l, r] = topology.nodes[i];
-            c.boxes[i] = c.bounds(l).union(c.bounds(r));
-            c.counts[i] = c.run(l).1 + c.run(r).1;
-            c.plans[i] = c.choose(i, &c.plan(l), &c.plan(r));
-        }
-        c
-    }
-
-    fn bounds(&self, child: Child) -> Aabb<f32> {
-        if child.is_leaf() {
-            let run = &self.topology.order[child.range()];
-            run.iter().fold(Aabb::empty(), |b, &p| b.union(self.primitives[p as usize]))
-        } else {
-            self.boxes[child.first as usize]
-        }
-    }
-
-    /// The primitives below: where they begin, and how many. A subtree's are one run, written depth first.
-    fn run(&self, child: Child) -> (u32, u32) {
-        let mut first = child;
-        while !first.is_leaf() {
-            first = self.topology.nodes[first.first as usize][0];
-        }
-        let count = if child.is_leaf() { child.count } else { self.counts[child.first as usize] };
-        (first.first, count)
-    }
-
-    fn plan(&self, child: Child) -> Plan {
-        if child.is_leaf() {
-            Plan { cost: [leaf_cost(child.count) * self.bounds(child).area(); 8], left: [0; 8] }
-        } else {
-            self.plans[child.first as usize]
-        }
-    }
-
-    fn choose(&self, node: usize, l: &Plan, r: &Plan) -> Plan {
-        let mut plan = Plan { cost: [f32::INFINITY; 8], left: [0; 8] };
-        // Shown as j + 1 children: at least one to each side.
-        let split = |j: usize| {
-            (0..j)
-                .map(|k| (l.cost[k] + r.cost[j - 1 - k], k as u8 + 1))
-                .fold((f32::INFINITY, 1), |a, b| if b.0 < a.0 { b } else { a })
-        };
-        let area = self.boxes[node].area();
-        let (below, left) = split(7);
-        let inner = area + below;
-        let count = self.counts[node];
-        let leaf = if count <= LEAF { leaf_cost(count) * area } else { f32::INFINITY };
-        (plan.cost[0], plan.left[0]) = if leaf <= inner { (leaf, 0) } else { (inner, left) };
-        for j in 1..8 {
-            let (cost, left) = split(j);
-            (plan.cost[j], plan.left[j]) = if plan.cost[j - 1] <= cost { (plan.cost[j - 1], 0) } else { (cost, left) };
-        }
-        plan
-    }
-
-    /// The children that a subtree is shown as, at most `count`.
-    fn gather(&self, at: Child, count: u8, children: &mut Vec<Child>) {
-        let mut count = count;
-        if !at.is_leaf() {
-            let plan = &self.plans[at.first as usize];
-            while count > 1 && plan.left[count as usize - 1] == 0 {
-                count -= 1;
-            }
-            if count > 1 {
-                let left = plan.left[count as usize - 1];
-                let [l, r] = self.topology.nodes[at.first as usize];
-                self.gather(l, left, children);
-                self.gather(r, count - left, children);
-                return;
-            }
-        }
-        children.push(at);
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::BuildQuality;
+    use crate::build::Topology;
 
     fn check(triangles: &[[Vec3; 3]]) {
         let boxes: Vec<_> = triangles.iter().map(|t| Aabb::from_points(*t)).collect();
