@@ -60,31 +60,51 @@ impl Plane {
 /// the test has accepted, and [`LocalRay::delta`] covers that.
 const STEEP: f64 = 1.0 / 16.0;
 
-/// Sines (squared) between edges below this lose too many digits of a plain cross product.
-const SLIVER: f64 = 1.0 / (1u64 << 40) as f64;
+/// How many digits of `t` the shortest way may lose: sines (squared) between the edges of a triangle below `sliver` lose
+/// too many in a plain cross product, hits nearer than `near` times what [`LocalRay::span`] says too many of their
+/// distance to some vertex.
+struct Loss {
+    sliver: f64,
+    near: f64,
+}
 
-/// [`triangle::plane_parameter`] and [`triangle::area_vector`] by the shortest way where that is as good for a `t` of
-/// 29 digits, as nearly always.
+/// 29 digits are left, some more than `f32` has.
+const MOST: Loss = Loss { sliver: 1.0 / (1u64 << 40) as f64, near: 4.0 / (1u64 << 20) as f64 };
+
+/// Some three digits are lost.
+const LEAST: Loss = Loss { sliver: 1.0 / 16.0, near: 1.0 / 16.0 };
+
+/// [`triangle::plane_parameter`] and [`triangle::area_vector`] by the shortest way where no more is lost, as nearly
+/// always. Nothing for a `t` that lies before `from` for certain.
 #[inline(always)]
-fn plane(vertices: &[Vec3; 3], ray: &LocalRay) -> Option<Plane> {
+fn plane(vertices: &[Vec3; 3], ray: &LocalRay, loss: &Loss, from: f64) -> Option<Plane> {
     let [a, b, c] = double(vertices);
     let (e1, e2, r) = (b - a, c - a, a - ray.origin);
     let normal = e1.cross(e2);
     let along = normal.dot(ray.direction);
     let t = normal.dot(r) / along;
     let (nn, dd) = (normal.length_squared(), ray.length_squared);
-    let plain = nn > SLIVER * (e1.length_squared() * e2.length_squared())
-        && along * along > STEEP * (nn * dd)
-        && t.abs() > ray.near;
-    if plain { Some(Plane { t, normal, grazing: false }) } else { careful_plane(*vertices, *ray) }
+    let fat = nn > loss.sliver * (e1.length_squared() * e2.length_squared());
+    if !(fat && along * along > STEEP * (nn * dd)) {
+        return careful_plane(*vertices, *ray, true);
+    }
+    if t.abs() > loss.near * ray.span {
+        return Some(Plane { t, normal, grazing: false });
+    }
+    // Nearly every ray that starts on a surface meets the triangle that it comes from here. What lies before
+    // the interval by more than any of this may be off (2^-31 of the span, by the thinnest triangle) is not wanted.
+    if t < from - ray.span * (1.0 / (1u64 << 26) as f64) {
+        return None;
+    }
+    careful_plane(*vertices, *ray, false)
 }
 
 /// The same with all digits. By value: what is passed by reference has to be kept in memory by the caller, always.
 #[inline(never)]
-fn careful_plane(vertices: [Vec3; 3], ray: LocalRay) -> Option<Plane> {
+fn careful_plane(vertices: [Vec3; 3], ray: LocalRay, grazing: bool) -> Option<Plane> {
     let vertices = double(&vertices);
     let t = triangle::plane_parameter(vertices, ray.origin, ray.direction)?;
-    Some(Plane { t, normal: triangle::area_vector(vertices), grazing: true })
+    Some(Plane { t, normal: triangle::area_vector(vertices), grazing })
 }
 
 /// How a tier meets boxes and triangles.
@@ -216,12 +236,16 @@ impl<G: GuardSet> Kernel for RobustBy<G> {
     fn test((shear, guards): &Self::Setup, ray: &LocalRay, vertices: &[Vec3; 3], t_max: f64) -> Option<Found> {
         if !guards.has(Guards::WATERTIGHT) {
             let hit = Fast::test(&(), ray, vertices, t_max)?;
-            return if guards.has(Guards::PLANE_T) { Some(plane(vertices, ray)?.at(hit.u, hit.v)) } else { Some(hit) };
+            return if guards.has(Guards::PLANE_T) {
+                Some(plane(vertices, ray, &MOST, ray.t_min)?.at(hit.u, hit.v))
+            } else {
+                Some(hit)
+            };
         }
         let relative = relative(vertices, ray.origin32);
         let w = if guards.has(Guards::FALLBACK) { shear.weights(relative) } else { shear.weights_unguarded(relative) }?;
         if guards.has(Guards::PLANE_T) {
-            return Some(plane(vertices, ray)?.at(w.u, w.v));
+            return Some(plane(vertices, ray, &MOST, ray.t_min)?.at(w.u, w.v));
         }
         let t = {
             // The depth of the weighted point along the axis that the ray follows most.
@@ -246,7 +270,7 @@ impl<G: GuardSet> Kernel for RobustBy<G> {
         if setup.1.has(Guards::WATERTIGHT | Guards::FALLBACK | Guards::PLANE_T)
             && let Some(w) = Weights::told::<true>(known)
         {
-            return Some(plane(vertices, ray)?.at(w.u, w.v));
+            return Some(plane(vertices, ray, &MOST, ray.t_min)?.at(w.u, w.v));
         }
         Self::test(setup, ray, vertices, t_max)
     }
@@ -257,7 +281,10 @@ impl<G: GuardSet> Kernel for RobustBy<G> {
             return Self::test(setup, ray, vertices, t_max);
         }
         let w = setup.0.crosses(relative(vertices, ray.origin32))?;
-        Some(crossing(plane(vertices, ray), vertices, ray, f64::from(w.u), f64::from(w.v)).at(w.u, w.v))
+        Some(
+            crossing(plane(vertices, ray, &MOST, f64::NEG_INFINITY), vertices, ray, f64::from(w.u), f64::from(w.v))
+                .at(w.u, w.v),
+        )
     }
 }
 
@@ -309,14 +336,14 @@ impl Kernel for Double {
     fn test(setup: &Shear<f64>, ray: &LocalRay, vertices: &[Vec3; 3], _: f64) -> Option<Found> {
         let [a, b, c] = double(vertices);
         let w = setup.weights([a - ray.origin, b - ray.origin, c - ray.origin])?;
-        Some(careful_plane(*vertices, *ray)?.at(w.u as f32, w.v as f32))
+        Some(plane(vertices, ray, &LEAST, ray.t_min)?.at(w.u as f32, w.v as f32))
     }
 
     #[inline(always)]
     fn crosses(setup: &Shear<f64>, ray: &LocalRay, vertices: &[Vec3; 3], _: f64) -> Option<Found> {
         let [a, b, c] = double(vertices);
         let w = setup.crosses([a - ray.origin, b - ray.origin, c - ray.origin])?;
-        let plane = crossing(careful_plane(*vertices, *ray), vertices, ray, w.u, w.v);
+        let plane = crossing(plane(vertices, ray, &LEAST, f64::NEG_INFINITY), vertices, ray, w.u, w.v);
         Some(plane.at(w.u as f32, w.v as f32))
     }
 }

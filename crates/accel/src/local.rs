@@ -103,8 +103,10 @@ pub(crate) struct LocalRay {
     /// By how much, in each axis, boxes are met as if larger: more than eight times [`LocalRay::reach`], since so far
     /// from its triangle a hit may lie (that of a ray which does not graze the plane).
     pub(crate) delta: f32,
-    /// A hit that is nearer to the true origin loses too many digits of its distance to some vertex, by 2^20 times.
-    pub(crate) near: f64,
+    /// Start of the ray's interval in this space's parameter.
+    pub(crate) t_min: f64,
+    /// No vertex is farther from the true origin, in each axis and in units of the parameter.
+    pub(crate) span: f64,
     /// Of the direction.
     pub(crate) length_squared: f64,
     /// The moved origin in single precision.
@@ -162,7 +164,8 @@ impl LocalRay {
             farthest,
             most,
             delta: delta.to_f32(),
-            near: (farthest + shift.abs()) * (4.0 / (1u64 << 20) as f64),
+            t_min: ray.t_min * length,
+            span: farthest + 2.0 * shift.abs(),
             length_squared: direction.length_squared(),
             origin32: moved.as_vec3(),
             direction32: direction.as_vec3(),
