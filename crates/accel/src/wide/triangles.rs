@@ -256,6 +256,9 @@ impl<L: Lanes, G: GuardSet> Filter<L> for Either<L, G> {
     fn interval(&self, t_min: f32, t_max: f32) -> [L; 2] {
         if self.guards.has(Guards::WATERTIGHT) {
             self.sheared.interval(t_min, t_max)
+        } else if self.guards.has(Guards::PLANE_T) || self.guards.has(Guards::PADDING) {
+            // The hit gets another `t` than the filter knows.
+            self.plain.interval(f32::NEG_INFINITY, f32::INFINITY)
         } else {
             self.plain.interval(t_min, t_max)
         }
