@@ -4,6 +4,7 @@ mod crossings;
 mod degenerate;
 mod exact;
 mod guards;
+mod hard;
 mod invariance;
 mod leaks;
 mod rays;
