@@ -1,5 +1,5 @@
 //! Kernels by tier, through public queries on scenes that hold nothing else: one node of eight boxes that are all missed,
-//! one block of eight triangles that are all hit, and the tests of one box and one triangle of the geometry crate.
+//! one leaf of eight triangles that are all hit, and the tests of one box and one triangle of the geometry crate.
 //!
 //! `cargo bench -p firsthit-benches --bench kernel`
 

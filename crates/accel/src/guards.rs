@@ -15,9 +15,9 @@ bitflags::bitflags! {
     /// ```
     #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
     pub struct Guards: u8 {
-        /// Boxes are met as if larger by what the ray and the triangles may be off, and a hit is kept within its
-        /// triangle's box: no box with a hit is missed, and answers do not depend on the tree. Without: the plain
-        /// slab test in f32.
+        /// Boxes are met as if larger by what the ray and the triangles may be off, and a hit that may be off by more
+        /// is kept within its triangle's box: no box with a hit is missed, and answers do not depend on the tree.
+        /// Without: the plain slab test in f32.
         const PADDING = 1;
         /// Triangles are decided by edge functions that neighbours share (Woop, Benthin and Wald 2013). Without:
         /// Moeller and Trumbore's test in f32.

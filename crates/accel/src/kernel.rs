@@ -316,8 +316,8 @@ fn margin<L: Lanes>(ray: &LocalRay) -> Margin<L> {
     Margin(Sheared::new(ray.origin32, ray.direction32, &Shear::new(ray.direction32), off, slack(ray)))
 }
 
-/// How far outside its own depths a triangle may be hit: it is kept within its box, which is met as if larger, and seen
-/// with rounded vertices.
+/// How far outside its own depths a triangle may be hit: no farther than boxes are met as if larger, and it is seen with
+/// rounded vertices.
 #[inline(always)]
 fn slack(ray: &LocalRay) -> f32 {
     2.0 * ray.delta

@@ -11,8 +11,10 @@
 //!   in two axes), of the shear (u), of its product (u) and of the difference (u(|x| + |z|)).
 //!
 //! So a triangle that the `f32` test accepts lies within `u|o| + 8uR` of the exact ray ([`LocalRay::reach`]; a little
-//! more where moving the origin was rounded), and boxes that are met as if they were larger by a little more than that contain every hit: the answer is that of testing all
-//! triangles, whatever the tree.
+//! more where moving the origin was rounded). The hit is where that ray meets the triangle's plane: within eight times
+//! this of the triangle, unless the ray grazes it; then it is moved into the triangle's box
+//! ([`LocalRay::within_box`]). Boxes are met as if they were larger by a little more ([`LocalRay::delta`]), so they
+//! contain every hit: the answer is that of testing all triangles, whatever the tree.
 //!
 //! Setups that not every tier needs (of the box test, of a triangle test) are made by those who need them.
 

@@ -118,7 +118,8 @@ impl Scene {
 
     /// The nearest hit that `accept` accepts, other than on the flat primitive `source` that the ray starts from.
     ///
-    /// `accept` is asked about candidates in any order, and not about all of them. Their normal is not filled in.
+    /// `accept` is asked about candidates in any order, and not about all of them. Their normal is not that of the world
+    /// yet: it is in the object's space, and of any length.
     ///
     /// A curved shape is never skipped, since a ray may well meet it again: [`crate::SurfacePoint::spawn`] sees to it
     /// that the ray does not start behind its own surface.

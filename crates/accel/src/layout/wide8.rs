@@ -122,7 +122,7 @@ impl Node {
     }
 }
 
-/// Four triangles: coordinates by vertex and axis. Lanes that are not used hold NaN.
+/// Four triangles: coordinates by vertex and axis. Lanes that are not used hold NaN (after a refit 0).
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(16))]
 pub(crate) struct Block(pub(crate) [[[f32; 4]; 3]; 3]);

@@ -112,7 +112,7 @@ impl Scene {
     }
 
     /// As [`Scene::all_hits_into`], of the hits that `accept` accepts, other than on the flat primitive `source`.
-    /// `accept` is asked about each hit once, in any order, before its normal is filled in.
+    /// `accept` is asked about each hit once, in any order, before its normal is that of the world.
     pub fn all_hits_filtered_into(
         &self,
         ray: &Ray<f64>,

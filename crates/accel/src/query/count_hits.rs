@@ -31,7 +31,7 @@ impl Scene {
     }
 
     /// As [`Scene::count_hits`], of the hits that `accept` accepts, other than on the flat primitive `source`. `accept`
-    /// is asked about each hit once, in any order, before its normal is filled in.
+    /// is asked about each hit once, in any order, before its normal is that of the world.
     #[must_use]
     pub fn count_hits_filtered(
         &self,

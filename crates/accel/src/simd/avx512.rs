@@ -17,8 +17,8 @@ pub(super) unsafe fn run<W: Work>(work: W) -> W::Output {
     work.run::<Avx512>()
 }
 
-// SAFETY of all blocks below: the intrinsics need AVX-512VL and FMA, which `run` promises; pointers come from references to
-// as many bytes as are read or written.
+// SAFETY of all blocks below: the intrinsics need AVX-512 F, VL and FMA, which `run` promises; pointers come from
+// references to as many bytes as are read or written.
 #[allow(clippy::undocumented_unsafe_blocks, reason = "one reason for all, above")]
 impl Lanes for Avx512 {
     #[inline(always)]

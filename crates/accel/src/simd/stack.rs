@@ -7,8 +7,8 @@ use crate::build::MAX_DEPTH;
 /// Each level of a tree leaves at most seven children behind, and eight are written at once.
 const SIZE: usize = 7 * MAX_DEPTH as usize + 8;
 
-/// A stack of children, or of keys with the distance above and the child below. It lives on the machine's stack and is not cleared first: that
-/// would cost as much as a short ray.
+/// A stack of children, or of keys with the distance above and the child below. It lives on the machine's stack and is
+/// not cleared first: that would cost as much as a short ray.
 pub(crate) struct Stack<T> {
     entries: [MaybeUninit<T>; SIZE],
     len: usize,
@@ -43,7 +43,8 @@ impl<T: Copy> Stack<T> {
 
 impl Stack<u64> {
     /// Sorts the first `n` (2 to 8) of these keys, puts all but the smallest on top, smaller ones above, and returns the
-    /// smallest (the other way round if `reversed`). Few keys, nearly always, are sorted without a detour through memory.
+    /// smallest (the other way round if `reversed`). Few keys, as nearly always, are sorted without a detour through
+    /// memory.
     ///
     /// # Panics
     /// As [`Stack::push`].

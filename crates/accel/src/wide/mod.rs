@@ -29,8 +29,8 @@ pub(crate) struct BoxRay {
 /// Tests triangles. A trait and not a closure, which could not be told to be inlined: into what is compiled for the
 /// level, or every call would save and load all registers.
 pub(crate) trait Visit<P> {
-    /// Gets a triangle's place and vertices, and what the filter knows of it. Answers with the new end of the interval if it has become shorter, or
-    /// breaks. Must be `#[inline(always)]`.
+    /// Gets a triangle's place and vertices, and what the filter knows of it. Answers with the new end of the interval if
+    /// it has become shorter, or breaks. Must be `#[inline(always)]`.
     fn visit(
         &mut self,
         place: usize,
@@ -42,8 +42,8 @@ pub(crate) trait Visit<P> {
 
 /// Visits what the ray meets: nearer boxes first if `ORDERED`, else larger ones.
 ///
-/// The visitor gets each triangle that passes the filter. Boxes that begin *beyond* the end are skipped; those that begin at it
-/// are visited, so that triangles at equal distance are all seen.
+/// The visitor gets each triangle that passes the filter. Boxes that begin *beyond* the end are skipped; those that begin
+/// at it are visited, so that triangles at equal distance are all seen.
 #[inline(always)]
 pub(crate) fn traverse<L: Lanes, F: Filter<L>, P: Probe, const ORDERED: bool>(
     tree: &Wide8,
