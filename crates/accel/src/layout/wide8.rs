@@ -230,10 +230,11 @@ mod tests {
             let t = tree.triangle(place).unwrap();
             assert_eq!(triangles.get(p as usize).copied(), (!t[0].x.is_nan()).then_some(t));
         }
-        // Boxes of children hold what lies below.
-        fn below(tree: &Wide8, r: Reference) -> Aabb<f32> {
+        // Boxes of children hold what lies below, in leaves that have no triangle in common.
+        fn below(tree: &Wide8, r: Reference, places: &mut Vec<usize>) -> Aabb<f32> {
             if r.is_leaf() {
                 let used = (0..8).filter(|k| r.lanes() >> k & 1 == 1).map(|k| r.block() * 4 + k);
+                places.extend(used.clone());
                 return Aabb::from_points(used.flat_map(|k| tree.triangle(k).unwrap()));
             }
             let node = &tree.nodes[r.index()];
@@ -241,14 +242,20 @@ mod tests {
             for k in (0..8).filter(|&k| node.children[k] != u32::MAX) {
                 let p = node.planes.map(|p| p[k]);
                 let b = Aabb::new(Vec3::new(p[0], p[2], p[4]), Vec3::new(p[1], p[3], p[5]));
-                assert_eq!(b, below(tree, Reference(node.children[k])));
+                let child = Reference(node.children[k]);
+                assert!(child.is_leaf() || child.index() > r.index(), "a refit needs children after their parents");
+                assert_eq!(b, below(tree, child, places));
                 all = all.union(b);
             }
             all
         }
+        let mut places = Vec::new();
         if tree.root != Reference::NOTHING {
-            below(&tree, tree.root);
+            below(&tree, tree.root, &mut places);
         }
+        places.sort_unstable();
+        let used = (0..order.len()).filter(|&k| order[k] != u32::MAX);
+        assert!(used.eq(places), "every triangle in one leaf");
         let again = tree.refit(&order, triangles, &boxes);
         assert!(tree.nodes.iter().zip(&again.nodes).all(|(a, b)| a.planes == b.planes));
         assert!((0..order.len()).all(|k| order[k] == u32::MAX || tree.triangle(k) == again.triangle(k)));
@@ -259,14 +266,41 @@ mod tests {
         }
     }
 
+    fn scattered(n: usize) -> Vec<[Vec3; 3]> {
+        let random = |k: usize| ((k as u32).wrapping_mul(0x9e37_79b9) >> 8) as f32 / (1 << 24) as f32;
+        let point = |k: usize| Vec3::new(random(k), random(k + 77_777), random(3 * k + 1));
+        (0..n).map(|k| [0, 1, 2].map(|i| point(k) + point(7 * k + i) * 0.02)).collect()
+    }
+
     #[test]
     fn all_sizes() {
-        let random = |k: usize| ((k as u32).wrapping_mul(0x9e37_79b9) >> 8) as f32 / (1 << 24) as f32;
-        for n in (0..40).chain([1000, 5000]) {
-            let point = |k: usize| Vec3::new(random(k), random(k + 77_777), random(3 * k + 1));
-            let triangles: Vec<_> = (0..n).map(|k| [0, 1, 2].map(|i| point(k) + point(7 * k + i) * 0.02)).collect();
-            check(&triangles);
+        // The largest are collapsed by several tasks.
+        for n in (0..40).chain([1000, 5000, 40_000]) {
+            check(&scattered(n));
             check(&vec![[Vec3::ZERO, Vec3::X, Vec3::Y]; n]);
         }
+    }
+
+    /// Ever smaller things, each beside all that are smaller still: as deep as a tree gets.
+    #[test]
+    fn lists() {
+        let at = |k: i32| [Vec3::X, Vec3::Y, Vec3::Z].map(|p| p * 2f32.powi(-k));
+        check(&(0..120).map(at).collect::<Vec<_>>());
+        check(&(0..20_000).map(|k| at(k % 100)).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn any_number_of_threads_makes_the_same_tree() {
+        let triangles = scattered(40_000);
+        let boxes: Vec<_> = triangles.iter().map(|t| Aabb::from_points(*t)).collect();
+        let topology = Topology::single(&boxes, BuildQuality::Balanced);
+        let trees = [1, 3].map(|threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let (tree, order) = pool.install(|| Wide8::new(&topology, &triangles, &boxes));
+            let nodes: Vec<_> =
+                tree.nodes.iter().map(|n| (n.planes.map(|p| p.map(f32::to_bits)), n.children)).collect();
+            (tree.root, nodes, order)
+        });
+        assert!(trees[0] == trees[1]);
     }
 }
