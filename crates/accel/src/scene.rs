@@ -3,20 +3,20 @@
 use core::ops::{ControlFlow, Range};
 use std::sync::Arc;
 
-use firsthit_geometry::{Aabb, Precision, Ray, Real, slab::Slabs};
+use firsthit_geometry::{Aabb, Ray, Real, slab::Slabs};
 use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 
 use crate::build::Topology;
 use crate::instance::{Instance, tight_boxes};
-use crate::kernel::{Double, Exact, Fast, Guarded, Kernel, Robust};
+use crate::kernel::Kernel;
 use crate::layout::{Bvh2, Tree};
 use crate::local::LocalRay;
 use crate::model::{Model, PrimitiveId, Surface, limit};
-use crate::query::{Any, Closest, Collect, Collector, Dyn};
+use crate::query::{Any, Closest, Collect, Collector, Dyn, ForKernel};
 use crate::stats::{Off, Probe, Watch};
 use crate::traverse::traverse;
-use crate::{BuildError, BuildOptions, Crossings, Geometry, Guards, Hit, HitId, TraversalCounts};
+use crate::{BuildError, BuildOptions, Crossings, Geometry, Hit, HitId, TraversalCounts};
 
 /// What a scene's trees are like.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -254,15 +254,7 @@ impl Inner {
         collector: &mut C,
         probe: &mut P,
     ) -> ControlFlow<()> {
-        match self.options.precision {
-            Precision::Fast => self.trace_by::<SURFACES, Fast, C, P>(ray, collector, probe),
-            Precision::Robust if self.options.guards.contains(Guards::ALL.difference(Guards::OFFSET)) => {
-                self.trace_by::<SURFACES, Robust, C, P>(ray, collector, probe)
-            }
-            Precision::Robust => self.trace_by::<SURFACES, Guarded, C, P>(ray, collector, probe),
-            Precision::Double => self.trace_by::<SURFACES, Double, C, P>(ray, collector, probe),
-            Precision::Exact => self.trace_by::<SURFACES, Exact, C, P>(ray, collector, probe),
-        }
+        self.by_kernel(Trace::<SURFACES, C, P> { inner: self, ray, collector, probe })
     }
 
     pub(crate) fn trace_by<const SURFACES: bool, K: Kernel, C: Collector, P: Probe>(
@@ -332,6 +324,23 @@ impl Inner {
             bytes: (models + self.tree.bytes() + size_of_val(self.instances.as_slice())) as u64,
             degenerate_triangles: self.models.iter().map(|m| m.degenerate()).sum(),
         }
+    }
+}
+
+/// [`Inner::trace`].
+struct Trace<'a, const SURFACES: bool, C, P> {
+    inner: &'a Inner,
+    ray: &'a Ray<f64>,
+    collector: &'a mut C,
+    probe: &'a mut P,
+}
+
+impl<const SURFACES: bool, C: Collector, P: Probe> ForKernel for Trace<'_, SURFACES, C, P> {
+    type Output = ControlFlow<()>;
+
+    #[inline(always)]
+    fn run<K: Kernel>(self) -> ControlFlow<()> {
+        self.inner.trace_by::<SURFACES, K, C, P>(self.ray, self.collector, self.probe)
     }
 }
 

@@ -214,7 +214,7 @@ impl Part {
             self.nodes[index].set_box(slot, &shown.bounds);
             let child = shown.child;
             match later {
-                Some((task, list)) if !child.is_leaf() && c.inner[child.first as usize].count <= *task => {
+                Some((task, list)) if c.as_leaf(child).is_none() && c.inner[child.first as usize].count <= *task => {
                     list.push(Later { at: child, node: index, slot, depth: depth + 1 });
                 }
                 _ => {

@@ -40,7 +40,7 @@ impl Scene {
 }
 
 /// Work that depends on the tier: the choice is made once, outside of it.
-trait ForKernel {
+pub(crate) trait ForKernel {
     type Output;
     fn run<K: Kernel>(self) -> Self::Output;
 }
@@ -252,7 +252,7 @@ impl<K: Kernel> Work for AnyHitsOf<'_, K> {
 
 impl Inner {
     #[inline(always)]
-    fn by_kernel<W: ForKernel>(&self, work: W) -> W::Output {
+    pub(crate) fn by_kernel<W: ForKernel>(&self, work: W) -> W::Output {
         match self.options.precision {
             Precision::Fast => work.run::<Fast>(),
             Precision::Robust if self.options.guards.contains(Guards::ALL.difference(Guards::OFFSET)) => {

@@ -19,6 +19,7 @@ pub use all_hits::HitLists;
 pub(crate) use any_hit::Any;
 pub(crate) use closest_hit::Closest;
 pub use crossings::Crossings;
+pub(crate) use direct::ForKernel;
 
 use crate::{Hit, HitId};
 
