@@ -10,6 +10,8 @@ mod avx2;
 mod avx512;
 mod portable;
 mod stack;
+#[cfg(target_arch = "x86_64")]
+mod ymm;
 
 pub(crate) use portable::Portable;
 pub(crate) use stack::Stack;
