@@ -1,12 +1,13 @@
 //! What `accuracy` and `bench` share: the models that are measured, and the files that are written.
 
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use firsthit_import::{Imported, UpAxis};
-use firsthit_measure::Subject;
+use firsthit_measure::{Subject, result::Machine};
 use firsthit_render::output;
 
-use crate::console::Console;
+use crate::console::{Console, visible};
 use crate::error::Failure;
 
 /// Reads models; one without triangles is refused.
@@ -57,4 +58,17 @@ pub(crate) fn write(path: &Path, text: &str, console: Console) -> Result<(), Fai
     output::write_text(path, text).map_err(Failure::failed)?;
     console.say(format_args!("wrote {}", path.display()));
     Ok(())
+}
+
+/// Ends a table: the machine, what else is worth knowing of the run, and notes.
+pub(crate) fn end(out: &mut String, m: &Machine, more: &str, seed: u64, seconds: f64, notes: &[String]) {
+    let (cpu, noise) = (visible(&m.cpu), m.noise * 100.0);
+    let (cores, os) = (m.cores, &m.os);
+    let _ = writeln!(
+        out,
+        "{cpu}, {cores} cores, {os};{more} timings spread by {noise:.1} %; seed {seed}; {seconds:.1} s in all"
+    );
+    for note in notes {
+        let _ = writeln!(out, "note: {}", visible(note));
+    }
 }

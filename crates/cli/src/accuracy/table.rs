@@ -6,6 +6,7 @@ use firsthit_measure::result::{Accuracy, Model, ShapeRow, TierRow};
 use firsthit_measure::verdict::rate;
 
 use crate::console::{grouped, visible};
+use crate::measured;
 
 /// Everything that was measured.
 pub(crate) fn text(accuracy: &Accuracy) -> String {
@@ -19,20 +20,7 @@ pub(crate) fn text(accuracy: &Accuracy) -> String {
         let _ = writeln!(out, "\n{}\n", visible(&model.verdict));
     }
     shapes(&mut out, &accuracy.shapes);
-    let m = &accuracy.machine;
-    let _ = writeln!(
-        out,
-        "{}, {} cores, {}; timings spread by {:.1} %; seed {}; {:.1} s in all",
-        visible(&m.cpu),
-        m.cores,
-        m.os,
-        m.noise * 100.0,
-        accuracy.seed,
-        accuracy.seconds
-    );
-    for note in &accuracy.notes {
-        let _ = writeln!(out, "note: {}", visible(note));
-    }
+    measured::end(&mut out, &accuracy.machine, "", accuracy.seed, accuracy.seconds, &accuracy.notes);
     out
 }
 

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use firsthit_measure::bench::{Bench, BuildRow, SpeedRow};
 
 use crate::console::{grouped, visible};
+use crate::measured;
 
 /// Everything that was measured.
 pub(crate) fn text(bench: &Bench) -> String {
@@ -16,21 +17,8 @@ pub(crate) fn text(bench: &Bench) -> String {
         speeds(&mut out, &rows);
         out.push('\n');
     }
-    let m = &bench.machine;
-    let _ = writeln!(
-        out,
-        "{}, {} cores, {}; threads: {}; timings spread by {:.1} %; seed {}; {:.1} s in all",
-        visible(&m.cpu),
-        m.cores,
-        m.os,
-        bench.threads,
-        m.noise * 100.0,
-        bench.seed,
-        bench.seconds
-    );
-    for note in &bench.notes {
-        let _ = writeln!(out, "note: {}", visible(note));
-    }
+    let threads = format!(" threads: {};", bench.threads);
+    measured::end(&mut out, &bench.machine, &threads, bench.seed, bench.seconds, &bench.notes);
     out
 }
 
