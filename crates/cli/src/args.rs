@@ -11,6 +11,7 @@ use glam::DVec3;
 
 use crate::accuracy::AccuracyArgs;
 use crate::bench::BenchArgs;
+use crate::compare::CompareArgs;
 use crate::values::{self, AovList, Color, Hdri, Plane, Resolution};
 
 const EXAMPLES: &str = "\
@@ -70,6 +71,8 @@ pub(crate) enum Command {
     Accuracy(AccuracyArgs),
     /// Measure how fast builds and queries are, obvhs's own traversals beside them.
     Bench(BenchArgs),
+    /// Say in numbers how pictures differ from a reference.
+    Compare(CompareArgs),
     /// Print a script that completes this program's options in a shell.
     Completions {
         /// The shell.
@@ -78,7 +81,7 @@ pub(crate) enum Command {
     /// Print a manual page (roff).
     Man {
         /// The page of one command instead of the program's.
-        #[arg(value_parser = ["render", "inspect", "accuracy", "bench", "completions", "man"])]
+        #[arg(value_parser = ["render", "inspect", "accuracy", "bench", "compare", "completions", "man"])]
         command: Option<String>,
     },
 }

@@ -4,6 +4,7 @@
 mod accuracy;
 mod args;
 mod bench;
+mod compare;
 mod config;
 mod console;
 mod error;
@@ -44,6 +45,7 @@ fn run(command: Command, config: Option<&std::path::Path>) -> Result<Exit, Failu
         Command::Inspect(args) => inspect::run(&args).map(|()| Exit::Done),
         Command::Accuracy(args) => accuracy::run(&args),
         Command::Bench(args) => bench::run(&args),
+        Command::Compare(args) => compare::run(&args).map(|()| Exit::Done),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "firsthit", &mut script);

@@ -1,13 +1,19 @@
 //! How much a picture differs from a better one, and what a tier of precision does to a picture.
 
+mod compare;
 mod flip;
+mod heat;
+mod read;
 mod tiers;
 
 use firsthit_render::{View, film::Picture, view::srgb_to_linear};
 use glam::{DVec3, Vec3};
 use thiserror::Error;
 
+pub use compare::{Block, Comparison, compare};
 pub use flip::PIXELS_PER_DEGREE;
+pub use heat::heat;
+pub use read::read;
 pub use tiers::{PictureOptions, measure};
 
 /// Why pictures could not be compared.
@@ -87,20 +93,33 @@ pub fn different_pixels(reference: &Picture, test: &Picture) -> Result<u64, Pict
 /// # Errors
 /// When the pictures differ in size, or `pixels_per_degree` is no positive number.
 pub fn flip(reference: &Picture, test: &Picture, view: &View, pixels_per_degree: f64) -> Result<f64, PictureError> {
+    let map = flip_map(reference, test, view, pixels_per_degree)?;
+    Ok(map.iter().sum::<f64>() / map.len().max(1) as f64)
+}
+
+/// LDR-FLIP of every pixel, in [0, 1]: see [`flip()`].
+///
+/// # Errors
+/// As for [`flip()`].
+pub fn flip_map(
+    reference: &Picture,
+    test: &Picture,
+    view: &View,
+    pixels_per_degree: f64,
+) -> Result<Vec<f64>, PictureError> {
     check_sizes(reference, test)?;
     // A display whose pixels are that small shows no difference at all; the filters would be larger than any picture.
     if !(pixels_per_degree > 0.0 && pixels_per_degree <= 1e4) {
         return Err(PictureError::PixelsPerDegree(pixels_per_degree));
     }
     if reference.pixels.is_empty() {
-        return Ok(0.0);
+        return Ok(Vec::new());
     }
     let shown = |picture: &Picture| -> Vec<DVec3> {
         let light = |[r, g, b, _]: [f32; 4]| view.apply(Vec3::new(r, g, b)).map(srgb_to_linear).as_dvec3();
         picture.pixels.iter().map(|p| light(*p)).collect()
     };
-    let map = flip::map(reference.width as usize, &shown(reference), &shown(test), pixels_per_degree);
-    Ok(map.iter().sum::<f64>() / map.len() as f64)
+    Ok(flip::map(reference.width as usize, &shown(reference), &shown(test), pixels_per_degree))
 }
 
 fn check_sizes(a: &Picture, b: &Picture) -> Result<(), PictureError> {

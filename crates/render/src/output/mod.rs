@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 
 pub use png::write_png;
 
+use crate::film::Picture;
 use crate::{Aov, Film, View};
 
 /// A file format for pictures.
@@ -127,6 +128,17 @@ pub fn files(path: &Path, aovs: &[Aov]) -> Result<Vec<PathBuf>, OutputError> {
 /// [`OutputError::Io`] when it cannot be written.
 pub fn write_text(path: &Path, text: &str) -> Result<(), OutputError> {
     atomically(path, |out| out.write_all(text.as_bytes())).map_err(failed(path))
+}
+
+/// Writes a picture as a PNG file of 8 bits a channel, whole or not at all.
+///
+/// # Errors
+/// [`OutputError::Empty`] when there are no pixels, [`OutputError::Io`] when it cannot be written.
+pub fn write_picture(path: &Path, picture: &Picture, view: &View) -> Result<(), OutputError> {
+    if picture.pixels.is_empty() {
+        return Err(OutputError::Empty);
+    }
+    atomically(path, |out| write_png(out, picture, view, BitDepth::Eight)).map_err(failed(path))
 }
 
 /// Whether a file can be written there, by creating and removing what [`write_film`] would rename at the end. A file
