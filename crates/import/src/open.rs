@@ -73,6 +73,8 @@ impl FromStr for UpAxis {
 pub struct Options {
     /// The file's upward axis; the scene is turned so that it becomes +Y. `None`: as the format says (+Y).
     pub up: Option<UpAxis>,
+    /// The variant of materials to show, by name or number (glTF's KHR_materials_variants). `None`: the file's default.
+    pub variant: Option<String>,
     /// Limits against hostile files.
     pub limits: Limits,
 }
@@ -179,10 +181,15 @@ pub(crate) fn read_as(
     including: &Inclusion,
 ) -> Result<Imported, ImportError> {
     let bytes = files::read(file, &options.limits)?;
+    let is_gltf = format == Format::Gltf || (format == Format::Json && is_gltf_json(&bytes));
+    if let Some(variant) = options.variant.as_ref().filter(|_| !is_gltf) {
+        let cause = format!("there is no variant '{variant}': only glTF files have variants");
+        return Err(ImportError::unsupported(file, "", cause));
+    }
     match format {
         Format::Obj => obj::read_bytes(bytes, file, options),
         Format::Gltf => gltf::read_bytes(&bytes, file, options),
-        Format::Json if is_gltf_json(&bytes) => gltf::read_bytes(&bytes, file, options),
+        Format::Json if is_gltf => gltf::read_bytes(&bytes, file, options),
         Format::Toml | Format::Json => toml::read_bytes(&bytes, file, options, including),
     }
 }

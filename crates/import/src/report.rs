@@ -76,6 +76,8 @@ pub struct Report {
     pub files: BTreeSet<PathBuf>,
     /// The extensions that the file names.
     pub extensions: Vec<ExtensionUse>,
+    /// Names of the file's variants: the same shapes in other materials.
+    pub variants: Vec<String>,
     /// Animations in the file (they are not played).
     pub animations: u64,
     /// Triangles after instancing over *every* node of every scene in the file, also those that are not shown.

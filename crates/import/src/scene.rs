@@ -4,10 +4,16 @@
 //! Right-handed, +Y up, lengths in metres. World space is f64; mesh data is f32, in the mesh's own space. Colours are
 //! linear RGB with Rec. 709 primaries. Angles are in radians.
 
+mod material;
+
 use std::sync::Arc;
 
 use firsthit_geometry::Shape;
 use glam::{Affine2, DAffine3, DVec3, Vec3};
+
+pub use material::{
+    AlphaMode, Anisotropy, Clearcoat, DiffuseTransmission, Iridescence, MaterialDesc, MaterialModel, PbrMaterial, Sheen,
+};
 
 /// A whole scene. All indices are in range: readers check them.
 #[derive(Clone, Debug, Default)]
@@ -104,202 +110,6 @@ pub struct InstanceDesc {
     pub mesh: usize,
     /// From the mesh's space to the world. May mirror; must be invertible (readers bake or skip what is not).
     pub transform: DAffine3,
-}
-
-/// How a surface reflects, transmits and emits.
-#[derive(Clone, Debug)]
-pub struct MaterialDesc {
-    /// Name in the file.
-    pub name: String,
-    /// What it is made of.
-    pub model: MaterialModel,
-}
-
-/// The kinds of material.
-#[derive(Clone, Debug)]
-pub enum MaterialModel {
-    /// The glTF metallic-roughness model with its extensions; OBJ materials are mapped onto it.
-    Pbr(Box<PbrMaterial>),
-    /// Two-sided Lambert.
-    Diffuse {
-        /// Share of light reflected.
-        albedo: Vec3,
-    },
-    /// Perfect mirror without Fresnel.
-    Mirror {
-        /// Share of light reflected.
-        reflectance: Vec3,
-    },
-    /// Smooth dielectric: exact Fresnel, no absorption.
-    Glass {
-        /// Index of refraction inside; 1 outside.
-        ior: f32,
-    },
-    /// Isotropic GGX, height-correlated Smith, constant Fresnel, single scattering.
-    RoughMirror {
-        /// GGX alpha.
-        alpha: f32,
-        /// Constant Fresnel reflectance.
-        reflectance: Vec3,
-    },
-    /// Walter 2007 rough dielectric, GGX, uncorrelated Smith.
-    RoughGlass {
-        /// Index of refraction inside; 1 outside.
-        ior: f32,
-        /// GGX alpha.
-        alpha: f32,
-    },
-    /// Glows on the side from which its corners run counter-clockwise (outside, for shapes); black otherwise.
-    Emission {
-        /// Radiance, W/m²·sr.
-        radiance: Vec3,
-    },
-}
-
-/// How alpha is used.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum AlphaMode {
-    /// Alpha is ignored.
-    #[default]
-    Opaque,
-    /// Fully there or not at all, by a cutoff.
-    Mask {
-        /// Least alpha that is there.
-        cutoff: f32,
-    },
-    /// Alpha is coverage.
-    Blend,
-}
-
-/// glTF's metallic-roughness material with extensions. Defaults are the format's.
-#[derive(Clone, Debug)]
-pub struct PbrMaterial {
-    /// Linear base colour and alpha; multiplies the texture (sRGB) and the vertex colour.
-    pub base_color: glam::Vec4,
-    /// sRGB colour with alpha.
-    pub base_color_texture: Option<TextureRef>,
-    /// A texture of opacity alone (OBJ's `map_d`), linear; the channel it names multiplies alpha.
-    pub opacity_texture: Option<TextureRef>,
-    /// 0 dielectric to 1 metal.
-    pub metallic: f32,
-    /// Perceptual roughness: GGX alpha is its square.
-    pub roughness: f32,
-    /// Linear; the channel it names (glTF: B) multiplies `metallic`.
-    pub metallic_texture: Option<TextureRef>,
-    /// Linear; the channel it names (glTF: G) multiplies `roughness`.
-    pub roughness_texture: Option<TextureRef>,
-    /// Linear tangent-space normals.
-    pub normal_texture: Option<TextureRef>,
-    /// Scales the x and y of the normal texture.
-    pub normal_scale: f32,
-    /// A height map (OBJ's `map_bump`), linear, first channel; height = `bump_scale` * value in texture widths.
-    pub bump_texture: Option<TextureRef>,
-    /// Multiplies the height map.
-    pub bump_scale: f32,
-    /// Linear, channel R: share of ambient light. Kept for viewers; a ray tracer finds occlusion itself.
-    pub occlusion_texture: Option<TextureRef>,
-    /// Strength of the occlusion texture.
-    pub occlusion_strength: f32,
-    /// Linear emitted radiance (strength included), W/m²·sr; multiplies the texture.
-    pub emissive: Vec3,
-    /// sRGB.
-    pub emissive_texture: Option<TextureRef>,
-    /// How alpha is used.
-    pub alpha_mode: AlphaMode,
-    /// Whether back faces are shown.
-    pub double_sided: bool,
-    /// Shows the base colour as it is (KHR_materials_unlit).
-    pub unlit: bool,
-    /// Index of refraction (KHR_materials_ior).
-    pub ior: f32,
-    /// Share of light that is not reflected at the surface and goes through (KHR_materials_transmission).
-    pub transmission: f32,
-    /// Linear, channel R multiplies `transmission`.
-    pub transmission_texture: Option<TextureRef>,
-    /// 0: thin walled; > 0: the boundary of a solid (KHR_materials_volume), in mesh units.
-    pub thickness: f32,
-    /// Linear, channel G multiplies `thickness`.
-    pub thickness_texture: Option<TextureRef>,
-    /// Colour that white light turns into over `attenuation_distance`.
-    pub attenuation_color: Vec3,
-    /// In world units; infinite: no absorption.
-    pub attenuation_distance: f32,
-    /// Strength of the dielectric reflection (KHR_materials_specular).
-    pub specular: f32,
-    /// Linear, channel A multiplies `specular`.
-    pub specular_texture: Option<TextureRef>,
-    /// Colour of the dielectric reflection at normal incidence; may exceed 1.
-    pub specular_color: Vec3,
-    /// sRGB; multiplies `specular_color`.
-    pub specular_color_texture: Option<TextureRef>,
-}
-
-impl Default for PbrMaterial {
-    fn default() -> Self {
-        Self {
-            base_color: glam::Vec4::ONE,
-            base_color_texture: None,
-            opacity_texture: None,
-            metallic: 1.0,
-            roughness: 1.0,
-            metallic_texture: None,
-            roughness_texture: None,
-            normal_texture: None,
-            normal_scale: 1.0,
-            bump_texture: None,
-            bump_scale: 1.0,
-            occlusion_texture: None,
-            occlusion_strength: 1.0,
-            emissive: Vec3::ZERO,
-            emissive_texture: None,
-            alpha_mode: AlphaMode::Opaque,
-            double_sided: false,
-            unlit: false,
-            ior: 1.5,
-            transmission: 0.0,
-            transmission_texture: None,
-            thickness: 0.0,
-            thickness_texture: None,
-            attenuation_color: Vec3::ONE,
-            attenuation_distance: f32::INFINITY,
-            specular: 1.0,
-            specular_texture: None,
-            specular_color: Vec3::ONE,
-            specular_color_texture: None,
-        }
-    }
-}
-
-/// Every texture slot of a material.
-macro_rules! texture_slots {
-    ($material:ident, $($borrow:tt)+) => {
-        [
-            $($borrow)+ $material.base_color_texture,
-            $($borrow)+ $material.opacity_texture,
-            $($borrow)+ $material.metallic_texture,
-            $($borrow)+ $material.roughness_texture,
-            $($borrow)+ $material.normal_texture,
-            $($borrow)+ $material.bump_texture,
-            $($borrow)+ $material.occlusion_texture,
-            $($borrow)+ $material.emissive_texture,
-            $($borrow)+ $material.transmission_texture,
-            $($borrow)+ $material.thickness_texture,
-            $($borrow)+ $material.specular_texture,
-            $($borrow)+ $material.specular_color_texture,
-        ]
-    };
-}
-
-impl PbrMaterial {
-    /// All textures it has, for whoever treats them alike.
-    pub fn textures(&self) -> impl Iterator<Item = &TextureRef> {
-        texture_slots!(self, &).into_iter().flatten()
-    }
-
-    /// All textures it has, to be changed.
-    pub fn textures_mut(&mut self) -> impl Iterator<Item = &mut TextureRef> {
-        texture_slots!(self, &mut).into_iter().flatten()
-    }
 }
 
 /// How an image is put on a surface.

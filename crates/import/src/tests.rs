@@ -138,7 +138,7 @@ fn a_folder_stands_for_its_scene_file_and_no_other_toml() {
 #[test]
 fn a_file_of_another_kind_is_not_read_to_tell() {
     let dir = folder(&[("a.xyz", "ten bytes."), ("b", "glTF, it says")]);
-    let few = Options { limits: Limits { file_bytes: 4, ..Limits::default() }, up: None };
+    let few = Options { limits: Limits { file_bytes: 4, ..Limits::default() }, ..Options::default() };
     let e = open(dir.path().join("a.xyz"), &few).expect_err("no model");
     assert!(e.to_string().contains("'.xyz' files are not read"), "{e}");
     let e = open(dir.path().join("b"), &few).expect_err("too large");
@@ -176,7 +176,7 @@ fn the_limit_on_images_counts_for_all_models_of_a_scene() {
     let dir = painted_folder("objects = [{ shape = 'model', file = 'a.gltf' }, { shape = 'model', file = 'b.gltf' }]");
     assert_eq!(warnings(&read(dir.path())), [""; 0]);
     // Each of the images has four pixels of four bytes.
-    let one = Options { limits: Limits { image_bytes: 31, ..Limits::default() }, up: None };
+    let one = Options { limits: Limits { image_bytes: 31, ..Limits::default() }, ..Options::default() };
     let imported = open(dir.path(), &one).expect("images are not needed");
     let said = warnings(&imported);
     assert_eq!(said.len(), 1, "{said:?}");
@@ -193,7 +193,7 @@ fn encoded_images_of_obj_are_limited_together() {
     ]);
     let size = fs::metadata(dir.path().join("a.png")).expect("image").len();
     for (file_bytes, warned) in [(2 * size, 0), (2 * size - 1, 1)] {
-        let options = Options { limits: Limits { file_bytes, ..Limits::default() }, up: None };
+        let options = Options { limits: Limits { file_bytes, ..Limits::default() }, ..Options::default() };
         let said = warnings(&open(dir.path(), &options).expect("images are not needed"));
         assert_eq!(said.iter().filter(|w| w.contains("the most that is read")).count(), warned, "{said:?}");
     }

@@ -1,6 +1,6 @@
 //! Materials: metallic-roughness with its extensions (glTF 2.0 specification, section 3.9).
 
-use glam::{Vec3, Vec4};
+use glam::{Affine2, Vec3, Vec4};
 use gltf::json::extensions::material as ext;
 use gltf::json::material::AlphaMode as JsonAlphaMode;
 use gltf::json::texture;
@@ -32,18 +32,24 @@ pub(super) fn read<'a>(
         .collect()
 }
 
-/// Where the normal texture of a material looks for its coordinates.
+/// The texture coordinates that the tangents of a material follow, if it needs any: those of its normal texture, or
+/// else of what is directed by tangents as well.
 pub(super) fn normal_mapping(material: &MaterialDesc) -> Option<NormalMapping> {
     let MaterialModel::Pbr(pbr) = &material.model else { return None };
-    let texture = pbr.normal_texture.as_ref()?;
-    Some(NormalMapping { uv_set: texture.uv_set, transform: texture.transform })
+    let coat = pbr.clearcoat.as_ref().and_then(|c| c.normal_texture.as_ref());
+    let brushed = pbr.anisotropy.as_ref();
+    match pbr.normal_texture.as_ref().or(coat).or(brushed.and_then(|a| a.texture.as_ref())) {
+        Some(texture) => Some(NormalMapping { uv_set: texture.uv_set, transform: texture.transform }),
+        None => brushed.map(|_| NormalMapping { uv_set: 0, transform: Affine2::IDENTITY }),
+    }
 }
 
-struct Reader<'a, 'b> {
-    source: &'a Source<'b>,
+/// Reads one material.
+pub(super) struct Reader<'a, 'b> {
+    pub(super) source: &'a Source<'b>,
     textures: &'a mut Textures<'b>,
     report: &'a mut Report,
-    place: String,
+    pub(super) place: String,
 }
 
 impl Reader<'_, '_> {
@@ -138,7 +144,7 @@ impl Reader<'_, '_> {
             m.specular_color_texture =
                 self.texture(&format!("{place}/specularColorTexture"), &e.specular_color_texture, Red)?;
         }
-        Ok(())
+        self.layers(m, extensions)
     }
 
     /// KHR_materials_pbrSpecularGlossiness, which replaces metallic-roughness: the same is a dielectric whose
@@ -162,7 +168,7 @@ impl Reader<'_, '_> {
         Ok(())
     }
 
-    fn texture(
+    pub(super) fn texture(
         &mut self,
         key: &str,
         info: &Option<texture::Info>,
@@ -171,17 +177,17 @@ impl Reader<'_, '_> {
         info.as_ref().map(|info| self.info(key, info.into(), channel)).transpose()
     }
 
-    fn info(&mut self, key: &str, info: Info<'_>, channel: Channel) -> Result<TextureRef, ImportError> {
+    pub(super) fn info(&mut self, key: &str, info: Info<'_>, channel: Channel) -> Result<TextureRef, ImportError> {
         self.textures.reference(info, channel, &format!("{}/{key}", self.place))
     }
 
     /// A factor from 0 to 1.
-    fn unit(&mut self, key: &str, value: f32) -> f32 {
+    pub(super) fn unit(&mut self, key: &str, value: f32) -> f32 {
         self.within(key, Vec4::splat(value)).x
     }
 
     /// Factors from 0 to 1.
-    fn within(&mut self, key: &str, value: Vec4) -> Vec4 {
+    pub(super) fn within(&mut self, key: &str, value: Vec4) -> Vec4 {
         let clamped = value.clamp(Vec4::ZERO, Vec4::ONE);
         if clamped != value {
             self.warn(key, format!("{value} is not within 0 to 1: taken as {clamped}"));
@@ -190,7 +196,7 @@ impl Reader<'_, '_> {
     }
 
     /// Finite factors from 0.
-    fn positive(&mut self, key: &str, value: Vec3) -> Vec3 {
+    pub(super) fn positive(&mut self, key: &str, value: Vec3) -> Vec3 {
         let clamped = value.clamp(Vec3::ZERO, Vec3::MAX);
         if clamped != value {
             self.warn(key, format!("{value} is not from 0 upwards: taken as {clamped}"));
@@ -198,7 +204,7 @@ impl Reader<'_, '_> {
         clamped
     }
 
-    fn warn(&mut self, key: &str, message: String) {
+    pub(super) fn warn(&mut self, key: &str, message: String) {
         self.report.warn(self.source.file, format!("{}/{key}", self.place), message);
     }
 }

@@ -10,6 +10,7 @@ use super::attribute::Attributes;
 use super::bake::Influence;
 use super::source::Source;
 use super::tangent;
+use super::variant;
 use crate::scene::TriangleMesh;
 use crate::{ErrorKind, ImportError, Report};
 
@@ -34,6 +35,7 @@ pub(super) struct NormalMapping {
 pub(super) struct MeshReader<'a> {
     source: &'a Source<'a>,
     quantized: bool,
+    variant: Option<u32>,
     /// Vertices read, those of shared arrays each time.
     read: u64,
     vertices: u64,
@@ -70,9 +72,10 @@ const MOST_SHARING: u64 = 4;
 const MOST_SETS: u32 = 8;
 
 impl<'a> MeshReader<'a> {
-    pub(super) fn new(source: &'a Source<'a>) -> Self {
+    /// Materials are those of a variant, if one is given.
+    pub(super) fn new(source: &'a Source<'a>, variant: Option<u32>) -> Self {
         let quantized = source.uses("KHR_mesh_quantization");
-        Self { source, quantized, read: 0, vertices: 0, triangles: 0 }
+        Self { source, quantized, variant, read: 0, vertices: 0, triangles: 0 }
     }
 
     /// Reads the primitives of a mesh that make triangles, with its morph targets by `weights` (the mesh's own where
@@ -180,7 +183,8 @@ impl<'a> MeshReader<'a> {
             report.warn(source.file, place.as_str(), message);
         }
         mesh.triangles = triangles(mode, &indices);
-        let mut primitive = Primitive { number, material: json.material.map(|m| m.value()), mesh, influences };
+        let material = variant::material(source, json, self.variant, &place)?;
+        let mut primitive = Primitive { number, material, mesh, influences };
         compact(&mut primitive);
         self.budget(&primitive.mesh, &place)?;
         let mesh = &mut primitive.mesh;

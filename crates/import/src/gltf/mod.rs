@@ -26,6 +26,7 @@ mod extensions;
 mod glb;
 mod instance;
 mod json;
+mod layers;
 mod material;
 mod mesh;
 mod node;
@@ -35,6 +36,7 @@ mod tangent;
 mod tests;
 mod texture;
 mod uri;
+mod variant;
 
 use std::path::Path;
 
@@ -84,6 +86,8 @@ pub(crate) fn read_bytes(bytes: &[u8], path: &Path, options: &Options) -> Result
     extensions::check(path, &root, &mut report)?;
     json::check_references(path, &root)?;
     let source = Source::new(path, &root, bin, &options.limits, &mut report)?;
+    report.variants = variant::names(&root);
+    let variant = variant::choose(&source, options.variant.as_deref(), &report)?;
     check_accessors(&source)?;
     let nodes = Nodes::new(&source, &value, &mut report)?;
     report.triangles_all_scenes = triangles_all_scenes(&root);
@@ -93,7 +97,7 @@ pub(crate) fn read_bytes(bytes: &[u8], path: &Path, options: &Options) -> Result
     let mut scene = SceneDesc { name, ..SceneDesc::default() };
     let mut textures = Textures::new(&source);
     scene.materials = material::read(&source, &mut textures, &mut report)?;
-    instance::place(&source, &nodes, &mut scene, &mut report)?;
+    instance::place(&source, &nodes, variant, &mut scene, &mut report)?;
     for &node in &nodes.shown {
         let world = &nodes.world[node];
         scene.cameras.extend(camera_light::camera(&source, node, world, &mut report)?);

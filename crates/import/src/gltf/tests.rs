@@ -16,7 +16,7 @@ fn read(document: &Value, limits: Limits) -> Result<Imported, ImportError> {
     }
     let path = dir.path().join("made.gltf");
     fs::write(&path, document.to_string()).expect("file");
-    super::read(&path, &Options { limits, up: None })
+    super::read(&path, &Options { limits, up: None, variant: None })
 }
 
 #[test]

@@ -10,11 +10,17 @@ use super::mtl::{Entry, find_file};
 use super::texture::Texture;
 use crate::files::{self, Folder};
 use crate::image::{Encoded, decode_all};
-use crate::scene::{AlphaMode, Channel, ImageDesc, MaterialDesc, MaterialModel, PbrMaterial, Pixels, TextureRef};
+use crate::scene::{
+    AlphaMode, Anisotropy, Channel, Clearcoat, ImageDesc, MaterialDesc, MaterialModel, PbrMaterial, Pixels, Sheen,
+    TextureRef,
+};
 use crate::{ImportError, Limits, Report};
 
 /// How high the full range of a height map is with `-bm 1`, in widths of the texture: OBJ does not say.
 const BUMP_HEIGHT: f32 = 0.01;
+
+/// Roughness of sheen, of which MTL says nothing: that of Blender.
+const SHEEN_ROUGHNESS: f32 = 0.5;
 
 /// The colour of surfaces of which nothing is said.
 const NEUTRAL: Vec3 = Vec3::splat(0.8);
@@ -57,22 +63,7 @@ pub(super) fn map(
 
 fn warn_of_unsupported(entry: &Entry, report: &mut Report) {
     let unset = |value: &str| value.parse() == Ok(0.0_f32);
-    const KEYS: [&str; 14] = [
-        "Ps",
-        "Pc",
-        "Pcr",
-        "aniso",
-        "anisor",
-        "map_Ps",
-        "map_Pc",
-        "map_Pcr",
-        "map_aniso",
-        "map_anisor",
-        "map_Tr",
-        "disp",
-        "decal",
-        "refl",
-    ];
+    const KEYS: [&str; 6] = ["map_aniso", "map_anisor", "map_Tr", "disp", "decal", "refl"];
     let params = &entry.material.unknown_param;
     let found: Vec<_> = KEYS.into_iter().filter(|&k| params.get(k).is_some_and(|v| !unset(v))).collect();
     if !found.is_empty() {
@@ -153,6 +144,9 @@ struct Maps {
     normal: Map,
     roughness: Map,
     metallic: Map,
+    coat: Map,
+    coat_roughness: Map,
+    sheen: Map,
 }
 
 impl Maps {
@@ -190,6 +184,9 @@ impl Maps {
             normal: find("norm", other("norm")),
             roughness: find("map_Pr", other("map_Pr")),
             metallic: find("map_Pm", other("map_Pm")),
+            coat: find("map_Pc", other("map_Pc")),
+            coat_roughness: find("map_Pcr", other("map_Pcr")),
+            sheen: find("map_Ps", other("map_Ps")),
         }
     }
 }
@@ -283,6 +280,7 @@ impl Mapping<'_> {
             }
         }
         self.set_relief(&mut pbr);
+        self.set_layers(&mut pbr);
         pbr
     }
 
@@ -330,6 +328,39 @@ impl Mapping<'_> {
         if let Some(texture) = self.scalar_reference(&self.maps.roughness) {
             pbr.roughness_texture = Some(texture);
             pbr.roughness = roughness.filter(|&r| r > 0.0).unwrap_or(1.0);
+        }
+    }
+
+    /// Coat, sheen and brushing, of the physically based keywords. With a texture, a missing factor or one of 0 is 1.
+    fn set_layers(&self, pbr: &mut PbrMaterial) {
+        let factor = |key: &str, map: &Option<TextureRef>| {
+            let number = self.number(key).map_or(0.0, |x| x.clamp(0.0, 1.0));
+            if map.is_some() && number == 0.0 { 1.0 } else { number }
+        };
+        let (texture, roughness_texture) =
+            (self.scalar_reference(&self.maps.coat), self.scalar_reference(&self.maps.coat_roughness));
+        let coat = factor("Pc", &texture);
+        if coat > 0.0 {
+            pbr.clearcoat = Some(Box::new(Clearcoat {
+                factor: coat,
+                texture,
+                roughness: factor("Pcr", &roughness_texture),
+                roughness_texture,
+                ..Clearcoat::default()
+            }));
+        }
+        let color_texture = self.reference(&self.maps.sheen);
+        let sheen = factor("Ps", &color_texture);
+        if sheen > 0.0 {
+            let color = Vec3::splat(sheen);
+            pbr.sheen =
+                Some(Box::new(Sheen { color, color_texture, roughness: SHEEN_ROUGHNESS, roughness_texture: None }));
+        }
+        let strength = factor("aniso", &None);
+        if strength > 0.0 {
+            let turn = self.number("anisor").filter(|x| x.is_finite()).unwrap_or(0.0);
+            let rotation = std::f32::consts::TAU * turn;
+            pbr.anisotropy = Some(Box::new(Anisotropy { strength, rotation, texture: None }));
         }
     }
 

@@ -41,7 +41,10 @@
 //! | `Pr`, `Pm` with maps | roughness, metallic; they win over what Ns and illum say |
 //! | `-s`, `-o`, `-clamp`, `-mm`, `-bm`, `-imfchan` | honoured; `-blendu`, `-boost`, `-texres`, `-colorspace` change nothing here; `-t`, `-type`: warning |
 //! | `Ka`, `sharpness` | nothing: ambient light is traced |
-//! | `Pc`, `Pcr`, `Ps`, `aniso`, `anisor` and their maps, `map_Tr`, `disp`, `decal`, `refl` | not rendered, warning |
+//! | `Pc`, `Pcr` with maps | a clear coat and its roughness |
+//! | `Ps` with map | sheen: white, of roughness 0.5 |
+//! | `aniso`, `anisor` | anisotropy and its rotation, 1 being a full turn from the direction of u |
+//! | `map_aniso`, `map_anisor`, `map_Tr`, `disp`, `decal`, `refl` | not rendered, warning |
 //!
 //! All surfaces are seen from both sides, as OBJ knows no other. A texture is looked for beside its library, then
 //! beside the model; if its path leads nowhere or out of the model's folder, its bare name is tried.

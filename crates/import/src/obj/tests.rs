@@ -395,11 +395,27 @@ fn glass_keeps_its_textures() {
 
 #[test]
 fn what_is_not_rendered_is_said_once_a_material() {
-    let mtl = "newmtl a\nPs 1\nmap_Pcr a.png\nmap_Tr a.png\nmap_aniso a.png\naniso 0\n";
+    let mtl = "newmtl a\nmap_Tr a.png\nmap_aniso a.png\ndisp a.png\n";
     let (imported, _) = with_library(mtl, &[]);
     let warnings = warnings(&imported);
     assert_eq!(warnings.len(), 1, "{warnings:?}");
-    assert!(warnings[0].ends_with("material 'a': Ps, map_Pcr, map_aniso, map_Tr not rendered"), "{warnings:?}");
+    assert!(warnings[0].ends_with("material 'a': map_aniso, map_Tr, disp not rendered"), "{warnings:?}");
+}
+
+#[test]
+fn coat_sheen_and_brushing_are_layers() {
+    let m = material("Pc 0.5\nPcr 0.25\nPs 0.75\naniso 0.5\nanisor 0.25\n");
+    let coat = m.clearcoat.expect("a coat");
+    assert_eq!((coat.factor, coat.roughness), (0.5, 0.25));
+    assert_eq!(m.sheen.expect("sheen").color, Vec3::splat(0.75));
+    let brushed = m.anisotropy.expect("anisotropy");
+    assert_eq!((brushed.strength, brushed.rotation), (0.5, std::f32::consts::FRAC_PI_2));
+    let plain = material("Pc 0\nPcr 0.5\naniso 0\n");
+    assert!(plain.clearcoat.is_none() && plain.sheen.is_none() && plain.anisotropy.is_none());
+    let (_, m) = with_library("newmtl a\nmap_Pc grey.png\nmap_Pcr grey.png\n", &[("grey.png", [128, 128, 128, 255])]);
+    let coat = m[0].clearcoat.as_ref().expect("a coat");
+    assert_eq!((coat.factor, coat.roughness), (1.0, 1.0), "the textures alone");
+    assert!(coat.texture.is_some() && coat.roughness_texture.is_some());
 }
 
 #[test]

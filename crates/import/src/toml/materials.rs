@@ -6,7 +6,10 @@ use super::build::Builder;
 use super::schema::{self, Channel, Material, Pbr, Texture};
 use super::values::{Color, Number, not_negative, within};
 use crate::ImportError;
-use crate::scene::{self, AlphaMode, Filter, MaterialDesc, MaterialModel, PbrMaterial, TextureRef, Wrap};
+use crate::scene::{
+    self, AlphaMode, Anisotropy, Clearcoat, DiffuseTransmission, Filter, Iridescence, MaterialDesc, MaterialModel,
+    PbrMaterial, Sheen, TextureRef, Wrap,
+};
 
 impl Builder<'_> {
     /// Adds a material.
@@ -28,6 +31,47 @@ impl Builder<'_> {
         };
         // Where the file does not name a channel, it is the one of glTF's packed textures.
         use scene::Channel::{Alpha, Blue, Green, Red};
+        let d = factors;
+        let layers = PbrMaterial {
+            clearcoat: match d.clearcoat {
+                Some(c) => Some(Box::new(Clearcoat {
+                    texture: texture(&p.clearcoat_texture, Red)?,
+                    roughness_texture: texture(&p.clearcoat_roughness_texture, Green)?,
+                    normal_texture: texture(&p.clearcoat_normal_texture, Red)?,
+                    ..*c
+                })),
+                None => None,
+            },
+            sheen: match d.sheen {
+                Some(s) => Some(Box::new(Sheen {
+                    color_texture: texture(&p.sheen_color_texture, Red)?,
+                    roughness_texture: texture(&p.sheen_roughness_texture, Alpha)?,
+                    ..*s
+                })),
+                None => None,
+            },
+            iridescence: match d.iridescence {
+                Some(i) => Some(Box::new(Iridescence {
+                    texture: texture(&p.iridescence_texture, Red)?,
+                    thickness_texture: texture(&p.iridescence_thickness_texture, Green)?,
+                    ..*i
+                })),
+                None => None,
+            },
+            anisotropy: match d.anisotropy {
+                Some(a) => Some(Box::new(Anisotropy { texture: texture(&p.anisotropy_texture, Red)?, ..*a })),
+                None => None,
+            },
+            diffuse_transmission: match d.diffuse_transmission {
+                Some(t) => Some(Box::new(DiffuseTransmission {
+                    texture: texture(&p.diffuse_transmission_texture, Alpha)?,
+                    color_texture: texture(&p.diffuse_transmission_color_texture, Red)?,
+                    ..*t
+                })),
+                None => None,
+            },
+            ..d
+        };
         Ok(PbrMaterial {
             base_color_texture: texture(&p.base_color_texture, Red)?,
             opacity_texture: texture(&p.opacity_texture, Red)?,
@@ -41,7 +85,7 @@ impl Builder<'_> {
             thickness_texture: texture(&p.thickness_texture, Green)?,
             specular_texture: texture(&p.specular_texture, Alpha)?,
             specular_color_texture: texture(&p.specular_color_texture, Red)?,
-            ..factors
+            ..layers
         })
     }
 
@@ -138,8 +182,70 @@ fn pbr_factors(p: &Pbr) -> Result<PbrMaterial, String> {
         },
         specular: unit("specular", p.specular, 1.0)?,
         specular_color: p.specular_color.map_or(Vec3::ONE, |c| c.0),
+        dispersion: not_negative("dispersion", p.dispersion, 0.0)?,
+        clearcoat: clearcoat(p)?,
+        sheen: sheen(p)?,
+        iridescence: iridescence(p)?,
+        anisotropy: anisotropy(p)?,
+        diffuse_transmission: diffuse_transmission(p)?,
         ..d
     })
+}
+
+/// A layer is there if its strength or a texture of it is given; with a texture of its strength, the strength is 1.
+fn strength(what: &str, factor: Option<Number>, texture: Option<&Texture>) -> Result<Option<f32>, String> {
+    match (factor, texture) {
+        (None, None) => Ok(None),
+        _ => within(what, factor, 1.0, 0.0, 1.0).map(Some),
+    }
+}
+
+fn clearcoat(p: &Pbr) -> Result<Option<Box<Clearcoat>>, String> {
+    let Some(factor) = strength("clearcoat", p.clearcoat, p.clearcoat_texture.as_ref())? else { return Ok(None) };
+    let default = if p.clearcoat_roughness_texture.is_some() { 1.0 } else { 0.0 };
+    Ok(Some(Box::new(Clearcoat {
+        factor,
+        roughness: within("clearcoat_roughness", p.clearcoat_roughness, default, 0.0, 1.0)?,
+        normal_scale: p.clearcoat_normal_scale.map_or(1.0, |x| x.0 as f32),
+        ..Clearcoat::default()
+    })))
+}
+
+fn sheen(p: &Pbr) -> Result<Option<Box<Sheen>>, String> {
+    let color = match (p.sheen_color, &p.sheen_color_texture) {
+        (None, None) => return Ok(None),
+        (color, _) => share("sheen_color", color.unwrap_or(Color::WHITE))?,
+    };
+    let default = if p.sheen_roughness_texture.is_some() { 1.0 } else { 0.5 };
+    let roughness = within("sheen_roughness", p.sheen_roughness, default, 0.0, 1.0)?;
+    Ok(Some(Box::new(Sheen { color, roughness, ..Sheen::default() })))
+}
+
+fn iridescence(p: &Pbr) -> Result<Option<Box<Iridescence>>, String> {
+    let Some(factor) = strength("iridescence", p.iridescence, p.iridescence_texture.as_ref())? else {
+        return Ok(None);
+    };
+    let d = Iridescence::default();
+    Ok(Some(Box::new(Iridescence {
+        factor,
+        ior: within("iridescence_ior", p.iridescence_ior, d.ior, 1.0, 10.0)?,
+        thickness_min: not_negative("iridescence_thickness_min", p.iridescence_thickness_min, d.thickness_min)?,
+        thickness_max: not_negative("iridescence_thickness_max", p.iridescence_thickness_max, d.thickness_max)?,
+        ..d
+    })))
+}
+
+fn anisotropy(p: &Pbr) -> Result<Option<Box<Anisotropy>>, String> {
+    let Some(strength) = strength("anisotropy", p.anisotropy, p.anisotropy_texture.as_ref())? else { return Ok(None) };
+    let rotation = p.anisotropy_rotation_deg.map_or(0.0, |d| d.0.to_radians() as f32);
+    Ok(Some(Box::new(Anisotropy { strength, rotation, texture: None })))
+}
+
+fn diffuse_transmission(p: &Pbr) -> Result<Option<Box<DiffuseTransmission>>, String> {
+    let texture = p.diffuse_transmission_texture.as_ref();
+    let Some(factor) = strength("diffuse_transmission", p.diffuse_transmission, texture)? else { return Ok(None) };
+    let color = share("diffuse_transmission_color", p.diffuse_transmission_color.unwrap_or(Color::WHITE))?;
+    Ok(Some(Box::new(DiffuseTransmission { factor, color, ..DiffuseTransmission::default() })))
 }
 
 /// A share of light: at most all of it.

@@ -245,6 +245,28 @@ fn pbr_takes_every_field() {
 }
 
 #[test]
+fn layers_take_every_field_and_are_there_only_if_named() {
+    let m = pbr("dispersion = 0.5, clearcoat = 0.75, clearcoat_roughness = 0.25, clearcoat_normal_scale = 2, \
+        sheen_color = [0.5, 0.25, 0], sheen_roughness = 0.75, iridescence = 0.5, iridescence_ior = 1.5, \
+        iridescence_thickness_min = 200, iridescence_thickness_max = 300, anisotropy = 0.5, \
+        anisotropy_rotation_deg = 180, diffuse_transmission = 0.25, diffuse_transmission_color = [1, 0, 0]");
+    assert_eq!(m.dispersion, 0.5);
+    let coat = m.clearcoat.expect("a coat");
+    assert_eq!((coat.factor, coat.roughness, coat.normal_scale), (0.75, 0.25, 2.0));
+    let sheen = m.sheen.expect("sheen");
+    assert_eq!((sheen.color, sheen.roughness), (Vec3::new(0.5, 0.25, 0.0), 0.75));
+    let film = m.iridescence.expect("a film");
+    assert_eq!((film.factor, film.ior, film.thickness_min, film.thickness_max), (0.5, 1.5, 200.0, 300.0));
+    let brushed = m.anisotropy.expect("anisotropy");
+    assert_eq!((brushed.strength, brushed.rotation), (0.5, std::f32::consts::PI));
+    let through = m.diffuse_transmission.expect("diffuse transmission");
+    assert_eq!((through.factor, through.color), (0.25, Vec3::X));
+    let plain = pbr("");
+    assert!(plain.clearcoat.is_none() && plain.sheen.is_none() && plain.iridescence.is_none());
+    assert!(plain.anisotropy.is_none() && plain.diffuse_transmission.is_none() && plain.dispersion == 0.0);
+}
+
+#[test]
 fn pbr_defaults_are_friendly() {
     let m = pbr("");
     assert_eq!((m.base_color, m.metallic, m.roughness), (Vec4::new(0.8, 0.8, 0.8, 1.0), 0.0, 0.5));
@@ -272,6 +294,16 @@ fn textures_are_names_or_tables() {
         "thickness",
         "specular",
         "specular_color",
+        "clearcoat",
+        "clearcoat_roughness",
+        "clearcoat_normal",
+        "sheen_color",
+        "sheen_roughness",
+        "iridescence",
+        "iridescence_thickness",
+        "anisotropy",
+        "diffuse_transmission",
+        "diffuse_transmission_color",
     ];
     let all: String = slots.map(|s| format!("{s}_texture = 'checker.png', ")).concat();
     let m = pbr(&all);
@@ -280,7 +312,7 @@ fn textures_are_names_or_tables() {
         (metallic.map(|t| t.channel), roughness.map(|t| t.channel)),
         (Some(Channel::Blue), Some(Channel::Green))
     );
-    assert_eq!(m.textures().count(), 12, "every slot");
+    assert_eq!(m.textures().count(), 22, "every slot");
     assert!(m.textures().all(|t| t.image == 0), "one file, one image");
 
     let t = pbr("base_color_texture = { file = 'checker.png', uv_set = 1, scale = [2, 4], offset = [0.5, 0], \
@@ -461,7 +493,10 @@ fn scenes_include_scenes_but_not_themselves() {
         .collect();
     assert_eq!(lights, [DVec3::new(5.0, 1.0, 0.0), DVec3::new(0.0, 0.0, -1.0), DVec3::Y]);
     assert!(matches!(
-        open(part.join("ball.toml"), &Options { limits: Limits { depth: 0, ..Limits::default() }, up: None }),
+        open(
+            part.join("ball.toml"),
+            &Options { limits: Limits { depth: 0, ..Limits::default() }, ..Options::default() }
+        ),
         Err(ImportError { kind: ErrorKind::Limit(_), .. })
     ));
 
@@ -486,7 +521,7 @@ fn a_doubling_of_includes_stops_at_the_limit() {
     }
     fs::write(dir.path().join("12.toml"), "objects = [{ shape = 'sphere', center = [0, 0, 0], radius = 1 }]")
         .expect("file");
-    let limit = |instances| Options { up: None, limits: Limits { instances, ..Limits::default() } };
+    let limit = |instances| Options { limits: Limits { instances, ..Limits::default() }, ..Options::default() };
     assert_eq!(open(&path, &limit(4096)).unwrap_or_else(|e| panic!("{e}")).scene.instances.len(), 4096);
     assert!(matches!(open(&path, &limit(4095)), Err(ImportError { kind: ErrorKind::Limit(_), .. })));
 }
@@ -496,7 +531,7 @@ fn long_names_count_against_the_limit() {
     let (dir, path) = folder("scene.toml", "");
     let model = "{ shape = 'model', file = 'part.toml' }";
     fs::write(&path, format!("objects = [{}]", [model; 100].join(", "))).expect("file");
-    let limit = Options { up: None, limits: Limits { instances: 1000, ..Limits::default() } };
+    let limit = Options { limits: Limits { instances: 1000, ..Limits::default() }, ..Options::default() };
     for (length, fits) in [(9, true), (9000, false)] {
         let name = "n".repeat(length);
         let ball = format!("objects = [{{ shape = 'sphere', center = [0, 0, 0], radius = 1, name = '{name}' }}]");
