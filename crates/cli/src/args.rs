@@ -6,13 +6,13 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 use firsthit_geometry::Precision;
 use firsthit_import::UpAxis;
-use firsthit_render::{CameraChoice, Crop, EffectOverrides, IntegratorChoice, ViewTransform};
+use firsthit_render::{CameraChoice, Crop, EffectOverrides, IntegratorChoice, TextureFilter, ViewTransform};
 use glam::DVec3;
 
 use crate::accuracy::AccuracyArgs;
 use crate::bench::BenchArgs;
 use crate::compare::CompareArgs;
-use crate::values::{self, AovList, Color, Hdri, Plane, Resolution};
+use crate::values::{self, AovList, Color, Hdri, Plane, Resolution, Switch};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -165,6 +165,18 @@ pub(crate) struct QualityArgs {
     /// How carefully rays meet surfaces: fast, robust (no leaks), double or exact
     #[arg(long, value_name = "TIER", default_value = "robust")]
     pub(crate) precision: Precision,
+
+    /// Keep the light that bounces between the facets of rough surfaces; glTF's own formulas lose it
+    #[arg(long, value_name = "on|off", default_value = "on", value_parser = values::switch)]
+    pub(crate) energy_compensation: Switch,
+
+    /// Start shadow rays of coarse smooth meshes on the curved surface that is meant
+    #[arg(long, value_name = "on|off", default_value = "on", value_parser = values::switch)]
+    pub(crate) shadow_terminator: Switch,
+
+    /// Textures: trilinear (with smaller copies) or bilinear (the image alone; the samples do the rest)
+    #[arg(long, value_name = "NAME", default_value = "trilinear", value_parser = values::texture_filter)]
+    pub(crate) texture_filter: TextureFilter,
 }
 
 #[derive(Args, Debug)]
@@ -213,6 +225,10 @@ pub(crate) struct SceneArgs {
     /// The file's upward axis: +X, -X, +Y, -Y, +Z or -Z [default: what the format says, else +Y]
     #[arg(long, value_name = "AXIS", allow_hyphen_values = true)]
     pub(crate) up: Option<UpAxis>,
+
+    /// A variant of the file's materials, by name or by number from 0 (`inspect` lists them) [default: the file's]
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub(crate) variant: Option<String>,
 
     /// Light from around: an image by longitude and latitude (.hdr, .exr), or studio, white, black
     /// [default: the scene's, else the studio where there is no light]

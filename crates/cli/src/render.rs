@@ -22,7 +22,7 @@ use crate::progress::{Progress, Style};
 use crate::report::{Counts, RenderReport, Seconds, effects, explain_effects, rays_in_words, warnings};
 use crate::simd;
 use crate::target::Target;
-use crate::values::{Hdri, Resolution};
+use crate::values::{Hdri, Resolution, Switch};
 
 /// Renders a model as the arguments say.
 pub(crate) fn run(args: &RenderArgs, config: Option<&Path>) -> Result<Exit, Failure> {
@@ -65,7 +65,8 @@ impl Job<'_> {
 
         let started = Instant::now();
         self.console.detail(format_args!("reading {}", args.model.display()));
-        let options = firsthit_import::Options { up: args.scene.up, ..Default::default() };
+        let options =
+            firsthit_import::Options { up: args.scene.up, variant: args.scene.variant.clone(), ..Default::default() };
         let Imported { scene, report } = firsthit_import::open(&args.model, &options)?;
         self.console.warnings(&report, args.run.strict)?;
         self.spare_what_was_read(&report)?;
@@ -239,6 +240,9 @@ fn stage_options(args: &RenderArgs, render: &RenderOptions, target: &Target) -> 
         camera: args.camera.camera.clone(),
         camera_changes: camera_changes(&args.camera),
         aspect: f64::from(render.width) / f64::from(render.height),
+        energy_compensation: args.quality.energy_compensation == Switch::On,
+        shadow_terminator: args.quality.shadow_terminator == Switch::On,
+        texture_filter: args.quality.texture_filter,
     })
 }
 

@@ -6,7 +6,9 @@ use std::str::FromStr;
 use firsthit_accel::{BuildQuality, Layout};
 use firsthit_import::srgb;
 use firsthit_measure::scenario::{self, Scenario};
-use firsthit_render::{Aov, CameraChoice, Crop, EffectOverrides, EffectSet, IntegratorChoice, ViewTransform};
+use firsthit_render::{
+    Aov, CameraChoice, Crop, EffectOverrides, EffectSet, IntegratorChoice, TextureFilter, ViewTransform,
+};
 use glam::{DVec3, Vec3};
 
 /// Width and height in pixels.
@@ -118,6 +120,29 @@ pub(crate) fn color(s: &str) -> Result<Color, String> {
 pub(crate) fn tone_mapping(s: &str) -> Result<ViewTransform, String> {
     let found = ViewTransform::ALL.into_iter().find(|v| v.name() == s);
     found.ok_or_else(|| format!("expected one of: {}", ViewTransform::ALL.map(ViewTransform::name).join(", ")))
+}
+
+/// Whether something is done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Switch {
+    On,
+    Off,
+}
+
+pub(crate) fn switch(s: &str) -> Result<Switch, String> {
+    match s {
+        "on" => Ok(Switch::On),
+        "off" => Ok(Switch::Off),
+        _ => Err("expected on or off".into()),
+    }
+}
+
+pub(crate) fn texture_filter(s: &str) -> Result<TextureFilter, String> {
+    match s {
+        "trilinear" => Ok(TextureFilter::Trilinear),
+        "bilinear" => Ok(TextureFilter::Bilinear),
+        _ => Err("expected trilinear or bilinear".into()),
+    }
 }
 
 pub(crate) fn camera(s: &str) -> Result<CameraChoice, String> {

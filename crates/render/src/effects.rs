@@ -42,12 +42,24 @@ bitflags! {
         const AMBIENT_OCCLUSION = 1 << 15;
         /// Section planes.
         const CLIPPING = 1 << 16;
+        /// Clear coats.
+        const CLEARCOAT = 1 << 20;
+        /// Sheen of fibres.
+        const SHEEN = 1 << 21;
+        /// Hues of thin films.
+        const IRIDESCENCE = 1 << 22;
+        /// Brushed reflections.
+        const ANISOTROPY = 1 << 23;
+        /// Light that goes through diffusely.
+        const DIFFUSE_TRANSMISSION = 1 << 24;
+        /// Indices of refraction that differ between colours.
+        const DISPERSION = 1 << 25;
     }
 }
 
 impl EffectSet {
     /// Every single effect with the name that command lines and reports use, in the order of reports.
-    pub const NAMES: [(Self, &'static str); 17] = [
+    pub const NAMES: [(Self, &'static str); 23] = [
         (Self::SHADOWS, "shadows"),
         (Self::PUNCTUAL_LIGHTS, "punctual-lights"),
         (Self::AREA_LIGHTS, "area-lights"),
@@ -65,6 +77,12 @@ impl EffectSet {
         (Self::UNLIT, "unlit"),
         (Self::AMBIENT_OCCLUSION, "ambient-occlusion"),
         (Self::CLIPPING, "clipping"),
+        (Self::CLEARCOAT, "clearcoat"),
+        (Self::SHEEN, "sheen"),
+        (Self::IRIDESCENCE, "iridescence"),
+        (Self::ANISOTROPY, "anisotropy"),
+        (Self::DIFFUSE_TRANSMISSION, "diffuse-transmission"),
+        (Self::DISPERSION, "dispersion"),
     ];
 
     /// The set with one effect of this name (`ao` is short for `ambient-occlusion`).

@@ -32,7 +32,7 @@ pub use light::environment::Environment;
 pub use monitor::Monitor;
 pub use options::{
     Background, CameraChanges, CameraChoice, Clip, Crop, EffectOverrides, EnvironmentChoice, IntegratorChoice,
-    RenderOptions, StageOptions,
+    RenderOptions, StageOptions, TextureFilter,
 };
 pub use render::{RenderError, Rendered, render};
 pub use stage::{Stage, StageError};

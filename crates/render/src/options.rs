@@ -100,6 +100,24 @@ pub struct StageOptions {
     pub camera_changes: CameraChanges,
     /// Width / height of the picture, for framing.
     pub aspect: f64,
+    /// Light that bounces between the facets of rough glTF materials is added to what one bounce reflects. glTF's own
+    /// formulas, and the conventions of reference scenes, are without.
+    pub energy_compensation: bool,
+    /// Shadow rays of coarse meshes with smooth normals start on the curved surface that the normals mean. Reference
+    /// scenes are without.
+    pub shadow_terminator: bool,
+    /// How textures are anti-aliased.
+    pub texture_filter: TextureFilter,
+}
+
+/// How textures are anti-aliased where the file asks for smooth ones.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum TextureFilter {
+    /// Bilinear in and between smaller copies, by how much of the surface a pixel sees.
+    #[default]
+    Trilinear,
+    /// Bilinear in the image itself, as in reference scenes: the samples of a pixel do the rest.
+    Bilinear,
 }
 
 impl Default for StageOptions {
@@ -112,6 +130,9 @@ impl Default for StageOptions {
             camera: CameraChoice::Auto,
             camera_changes: CameraChanges::default(),
             aspect: 16.0 / 9.0,
+            energy_compensation: true,
+            shadow_terminator: true,
+            texture_filter: TextureFilter::default(),
         }
     }
 }

@@ -26,6 +26,8 @@ pub enum Dimension {
     Alpha(u32),
     /// Whether the path goes on.
     Roulette(u32),
+    /// Which colour a path follows once a surface parts them.
+    Color,
 }
 
 impl Dimension {
@@ -34,6 +36,8 @@ impl Dimension {
         const PURPOSES: u32 = 8;
         match self {
             Self::Pixel => 0,
+            // Of the first row, which has a bounce for no purpose but this one.
+            Self::Color => PURPOSES,
             Self::LightChoice(bounce) => 1 + PURPOSES * bounce,
             Self::LightPosition(bounce) => 2 + PURPOSES * bounce,
             Self::Lobe(bounce) => 3 + PURPOSES * bounce,
@@ -171,7 +175,7 @@ mod tests {
                     Dimension::Roulette(b),
                 ]
             })
-            .chain([Dimension::Pixel])
+            .chain([Dimension::Pixel, Dimension::Color])
             .map(Dimension::index)
             .collect();
         let count = numbers.len();

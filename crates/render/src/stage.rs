@@ -16,7 +16,7 @@ use crate::material::{Conventions, Material, Textures};
 use crate::setting::{self, Setting};
 use crate::surface::World;
 use crate::texture::TextureError;
-use crate::{Background, CameraChoice, EffectPlan, EffectSet, StageOptions, framing, survey};
+use crate::{Background, CameraChoice, EffectPlan, EffectSet, StageOptions, TextureFilter, framing, survey};
 
 /// A scene that cannot be staged.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -70,6 +70,8 @@ pub struct Stage {
     pub(crate) camera: Camera,
     pub(crate) background: Backdrop,
     pub(crate) reference: bool,
+    /// Shadow rays of smooth meshes start on the curved surface that is meant.
+    pub(crate) terminator: bool,
     plan: EffectPlan,
     explain: Vec<String>,
 }
@@ -155,8 +157,10 @@ impl Stage {
         plan.decide(&options.effects);
         let effects = plan.simulated();
 
-        let conventions = Conventions { reference, effects };
-        let mut textures = Textures::new(&scene.images, !reference);
+        let energy_compensation = options.energy_compensation && !reference;
+        let conventions = Conventions { reference, effects, energy_compensation };
+        let mips = !reference && options.texture_filter == TextureFilter::Trilinear;
+        let mut textures = Textures::new(&scene.images, mips);
         let default = MaterialDesc::default();
         let materials = scene
             .materials
@@ -206,7 +210,9 @@ impl Stage {
             ambient: if headlight.is_some() { survey::AMBIENT } else { Vec3::ZERO },
             ambient_reach: view.map_or(0.0, |v| 0.5 * v.distance),
         };
-        let mut stage = Self { world, accel, materials, flags, lights, camera, background, reference, plan, explain };
+        let terminator = options.shadow_terminator && !reference;
+        let mut stage =
+            Self { world, accel, materials, flags, lights, camera, background, reference, terminator, plan, explain };
         if let Some(view) = view.filter(|_| dim) {
             stage.lights.ambient = survey::even_light(&stage, &view, options.aspect);
         }

@@ -8,6 +8,8 @@ use firsthit_import::SceneDesc;
 use firsthit_import::scene::{SurfaceDesc, TriangleMesh};
 use glam::{DAffine3, DMat3, DVec3, Mat3, Vec2, Vec3, Vec4};
 
+use crate::material::Colors;
+
 /// The scene's geometry with what shading needs beside the trees.
 #[derive(Clone, Debug)]
 pub(crate) struct World {
@@ -97,6 +99,7 @@ impl World {
             smooth: Vec3::Z,
             lift: DVec3::ZERO,
             width: 0.0,
+            colors: Colors::All(1),
         }
     }
 
@@ -120,6 +123,7 @@ impl World {
             smooth: geometric,
             lift: DVec3::ZERO,
             width,
+            colors: Colors::All(1),
         };
         if let Some(n) = surface.vertex_normal() {
             let n = surface.instance.normals * n;
@@ -159,6 +163,8 @@ pub(crate) struct Surface<'a> {
     pub(crate) lift: DVec3,
     /// Width of the cone of view here, world units.
     width: f32,
+    /// Which colours the path is about that came here.
+    pub(crate) colors: Colors,
 }
 
 impl Surface<'_> {
@@ -273,10 +279,10 @@ impl Surface<'_> {
         }
     }
 
-    /// A normal from a normal map, in the world and on the viewer's side.
-    pub(crate) fn mapped_normal(&self, n: Vec3, set: usize) -> Option<Vec3> {
+    /// Tangent and bitangent in the world: those of the mesh, else along the texture coordinates.
+    pub(crate) fn tangents(&self, set: usize) -> Option<[Vec3; 2]> {
         let outward = if self.front { self.smooth } else { -self.smooth };
-        let (tangent, bitangent) = match self.part {
+        match self.part {
             Part::Triangle { mesh, corners, weights } if !mesh.tangents.is_empty() => {
                 let t: Vec4 = (0..3).map(|i| mesh.tangents[corners[i]] * weights[i]).sum();
                 let tangent = (self.instance.vectors * t.truncate()).try_normalize()?;
@@ -284,11 +290,17 @@ impl Surface<'_> {
                 let normal = self.instance.normals * self.vertex_normal().unwrap_or(Vec3::ZERO);
                 let normal = normal.try_normalize().unwrap_or(outward);
                 let mirrored = self.instance.vectors.determinant().signum();
-                (tangent, normal.cross(tangent) * (t.w.signum() * mirrored))
+                Some([tangent, normal.cross(tangent) * (t.w.signum() * mirrored)])
             }
             // An image's v runs downwards, a normal map's y upwards.
-            _ => self.along_uv(set).map(|[u, v]| (u, -v))?,
-        };
+            _ => self.along_uv(set).map(|[u, v]| [u, -v]),
+        }
+    }
+
+    /// A normal from a normal map, in the world and on the viewer's side.
+    pub(crate) fn mapped_normal(&self, n: Vec3, set: usize) -> Option<Vec3> {
+        let outward = if self.front { self.smooth } else { -self.smooth };
+        let [tangent, bitangent] = self.tangents(set)?;
         let n = (tangent * n.x + bitangent * n.y + outward * n.z).try_normalize()?;
         Some(if self.front { n } else { -n })
     }

@@ -12,6 +12,7 @@ use crate::integrator::whitted::{Limits, Seen};
 use crate::integrator::{ROUGHEST_FOLLOWED, Tracer};
 use crate::light::environment::luminance;
 use crate::light::punctual::PunctualLight;
+use crate::material::layers;
 use crate::material::lobes::LobeKind;
 use crate::sampler::{Dimension, PixelSampler};
 use crate::{EffectPlan, EffectSet, Environment, Stage, warp};
@@ -90,7 +91,7 @@ fn effects_of_pbr(m: &PbrMaterial) -> EffectSet {
         &m.specular_texture,
         &m.specular_color_texture,
     ];
-    set.set(EffectSet::TEXTURES, textures.iter().any(|t| t.is_some()));
+    set.set(EffectSet::TEXTURES, textures.iter().any(|t| t.is_some()) || layers::have_textures(m));
     match m.alpha_mode {
         AlphaMode::Opaque => {}
         AlphaMode::Mask { .. } => set |= EffectSet::ALPHA_MASK,
@@ -99,7 +100,10 @@ fn effects_of_pbr(m: &PbrMaterial) -> EffectSet {
     if m.unlit {
         return set | EffectSet::UNLIT;
     }
-    if m.normal_texture.is_some() || m.bump_texture.is_some() {
+    let over = layers::effects(m);
+    set |= over;
+    let coat_normals = m.clearcoat.as_ref().is_some_and(|c| c.normal_texture.is_some());
+    if m.normal_texture.is_some() || m.bump_texture.is_some() || coat_normals {
         set |= EffectSet::TEXTURES | EffectSet::NORMAL_MAPS;
     }
     if m.emissive.max_element() > 0.0 {
@@ -107,12 +111,13 @@ fn effects_of_pbr(m: &PbrMaterial) -> EffectSet {
     }
     let smooth = m.roughness_texture.is_some() || m.roughness * m.roughness <= ROUGHEST_FOLLOWED;
     let coated = m.specular > 0.0 && m.ior != 1.0 && smooth;
-    set.set(EffectSet::REFLECTION, m.metallic > 0.0 || coated);
-    if m.transmission > 0.0 {
+    let mirrors = EffectSet::CLEARCOAT | EffectSet::IRIDESCENCE;
+    set.set(EffectSet::REFLECTION, m.metallic > 0.0 || coated || over.intersects(mirrors));
+    if m.transmission > 0.0 || over.contains(EffectSet::DIFFUSE_TRANSMISSION) {
         if m.thickness > 0.0 {
             set |= EffectSet::REFRACTION | EffectSet::REFLECTION;
             set.set(EffectSet::ABSORPTION, m.attenuation_distance.is_finite() && m.attenuation_color != Vec3::ONE);
-        } else {
+        } else if m.transmission > 0.0 {
             set |= EffectSet::TRANSMISSION;
         }
     }

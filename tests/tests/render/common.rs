@@ -40,6 +40,17 @@ pub(crate) fn quad(scene: &mut SceneDesc, corner: DVec3, u: DVec3, v: DVec3, mat
     add(scene, SurfaceDesc::Triangles(mesh), material);
 }
 
+/// Adds a parallelogram with texture coordinates (0 to 1 along `u`, along -`v` downwards) and no tangents.
+pub(crate) fn mapped_quad(scene: &mut SceneDesc, corner: DVec3, u: DVec3, v: DVec3, material: usize) {
+    let mesh = TriangleMesh {
+        positions: [corner, corner + u, corner + u + v, corner + v].map(DVec3::as_vec3).to_vec(),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        uvs: vec![[[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]].map(glam::Vec2::from).to_vec()],
+        ..TriangleMesh::default()
+    };
+    add(scene, SurfaceDesc::Triangles(mesh), material);
+}
+
 /// Adds a sphere.
 pub(crate) fn ball(scene: &mut SceneDesc, center: DVec3, radius: f64, material: usize) {
     add(scene, SurfaceDesc::Shape(Shape::Sphere(Sphere::new(center, radius).unwrap())), material);

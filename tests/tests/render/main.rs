@@ -1,6 +1,7 @@
 //! Pictures against answers that are known in closed form.
 
 mod common;
+mod layers;
 mod references;
 
 use std::f64::consts::PI;
@@ -14,25 +15,25 @@ use firsthit_render::{
 };
 use glam::{DAffine3, DVec3, Vec3, Vec4};
 
-fn diffuse(albedo: f32) -> MaterialModel {
+pub(crate) fn diffuse(albedo: f32) -> MaterialModel {
     MaterialModel::Diffuse { albedo: Vec3::splat(albedo) }
 }
 
-fn glow(radiance: f32) -> MaterialModel {
+pub(crate) fn glow(radiance: f32) -> MaterialModel {
     MaterialModel::Emission { radiance: Vec3::splat(radiance) }
 }
 
-fn pbr(change: impl FnOnce(&mut PbrMaterial)) -> MaterialModel {
+pub(crate) fn pbr(change: impl FnOnce(&mut PbrMaterial)) -> MaterialModel {
     let mut m = PbrMaterial::default();
     change(&mut m);
     MaterialModel::Pbr(Box::new(m))
 }
 
-fn light(kind: LightKind) -> LightDesc {
+pub(crate) fn light(kind: LightKind) -> LightDesc {
     LightDesc { name: String::new(), kind }
 }
 
-fn surrounded(mut scene: SceneDesc, radiance: f32) -> SceneDesc {
+pub(crate) fn surrounded(mut scene: SceneDesc, radiance: f32) -> SceneDesc {
     scene.environment = Some(EnvironmentDesc::Constant { radiance: Vec3::splat(radiance) });
     scene
 }
@@ -45,7 +46,7 @@ fn floor(material: MaterialModel) -> (SceneDesc, usize) {
 }
 
 #[track_caller]
-fn assert_near(found: f64, expected: f64, tolerance: f64) {
+pub(crate) fn assert_near(found: f64, expected: f64, tolerance: f64) {
     assert!((found - expected).abs() <= tolerance * expected.abs().max(1e-12), "{found} instead of {expected}");
 }
 
@@ -419,11 +420,11 @@ fn everything() -> SceneDesc {
     surrounded(scene, 0.3)
 }
 
-fn small(spp: u32) -> RenderOptions {
+pub(crate) fn small(spp: u32) -> RenderOptions {
     RenderOptions { width: 48, height: 32, spp, seed: 5, ..RenderOptions::default() }
 }
 
-fn bits(rendered: &Rendered) -> Vec<[u32; 4]> {
+pub(crate) fn bits(rendered: &Rendered) -> Vec<[u32; 4]> {
     rendered.film.color().pixels.iter().map(|p| p.map(f32::to_bits)).collect()
 }
 
@@ -507,7 +508,7 @@ fn the_specialised_kernel_gives_the_bits_of_the_full_one() {
     let mut plain = scene_of(&[diffuse(0.6), MaterialModel::Mirror { reflectance: Vec3::splat(0.9) }]);
     quad(&mut plain, DVec3::new(-6.0, -1.0, 6.0), DVec3::X * 12.0, DVec3::Z * -12.0, 0);
     ball(&mut plain, DVec3::ZERO, 1.0, 1);
-    for scene in [surrounded(plain, 0.8), everything()] {
+    for scene in [surrounded(plain, 0.8), everything(), layers::everything()] {
         let full = StageOptions {
             effects: EffectOverrides { add: EffectSet::all(), ..EffectOverrides::default() },
             ..StageOptions::default()

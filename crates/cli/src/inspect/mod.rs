@@ -65,6 +65,8 @@ struct Inspection<'a> {
     lights: usize,
     cameras: usize,
     animations: u64,
+    /// Names of the file's variants of materials.
+    variants: &'a [String],
     /// Of what has an end, in world units.
     bounds: Option<Bounds>,
     mesh_list: Vec<Mesh<'a>>,
@@ -185,6 +187,7 @@ impl<'a> Inspection<'a> {
             lights: scene.lights.len(),
             cameras: scene.cameras.len(),
             animations: report.animations,
+            variants: &report.variants,
             bounds: bounds.is_finite().then(|| Bounds { min: bounds.min.to_array(), max: bounds.max.to_array() }),
             material_list: scene.materials.iter().map(|m| material(&m.name, &m.model)).collect(),
             texture_list: scene

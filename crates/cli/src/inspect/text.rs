@@ -47,6 +47,9 @@ impl fmt::Display for Inspection<'_> {
         if self.animations > 0 {
             row(f, "animations", format!("{} (not played)", self.animations))?;
         }
+        if !self.variants.is_empty() {
+            row(f, "variants", visible(&self.variants.join(", ")).into_owned())?;
+        }
         row(f, "extensions", grouped(self.extensions.len() as u64))?;
         list(f, &self.extensions, |e| {
             let required = if e.required { "required, " } else { "" };

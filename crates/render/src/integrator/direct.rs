@@ -8,8 +8,8 @@ use super::Tracer;
 use crate::RayKind;
 use crate::light::environment::luminance;
 use crate::light::{LightEnd, LightSample, power_heuristic};
-use crate::material::Bsdf;
 use crate::material::lobes::{Lobe, LobeKind};
+use crate::material::{Bsdf, MAX_LOBES};
 use crate::sampler::{Dimension, PixelSampler};
 use crate::surface::Surface;
 use crate::warp;
@@ -26,7 +26,7 @@ pub(super) struct Lit<'a> {
     pub(super) surface: &'a Surface<'a>,
     pub(super) bsdf: &'a Bsdf,
     /// Which lobes are also followed by rays, which may find the same lights: they share by weights.
-    pub(super) followed: [bool; 3],
+    pub(super) followed: [bool; MAX_LOBES],
     pub(super) sampler: PixelSampler,
     pub(super) bounce: u32,
     /// Light goes into a solid here, out of which it comes bent another time: only rays that follow it tell.
@@ -41,7 +41,7 @@ impl Lit<'_> {
         let behind = sample.direction.dot(self.surface.geometric) < 0.0;
         let mut total = Vec3::ZERO;
         for (lobe, followed) in self.bsdf.lobes().iter().zip(self.followed) {
-            let through = lobe.kind() == LobeKind::TRANSMISSION;
+            let through = lobe.goes_through();
             if !(if through { behind && !self.enters } else { before }) {
                 continue;
             }
@@ -108,7 +108,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
         if !(light.max_element() > 0.0) {
             return Vec3::ZERO;
         }
-        let origin = lit.origin(sample, !self.stage.reference);
+        let origin = lit.origin(sample, self.stage.terminator);
         light * self.transmittance(kind, origin, sample, lit.surface.id)
     }
 
@@ -166,7 +166,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
             }
         }
         let Some((sample, color)) = chosen else { return Vec3::ZERO };
-        let origin = lit.origin(&sample, !stage.reference);
+        let origin = lit.origin(&sample, stage.terminator);
         let arrives = self.transmittance(RayKind::ShadowEnvironment, origin, &sample, lit.surface.id);
         color * arrives * (sum / CANDIDATES as f32)
     }
@@ -191,6 +191,12 @@ pub(super) fn is_followed(lobe: &Lobe, kinds: LobeKind, reference: bool) -> bool
             Lobe::GgxReflection(ggx) => {
                 reference || ggx.alpha <= super::ROUGHEST_FOLLOWED || ggx.fresnel.reflectance(1.0).max_element() >= 0.2
             }
+            Lobe::AnisotropicGgx(ggx) => {
+                reference
+                    || ggx.alpha.min_element() <= super::ROUGHEST_FOLLOWED
+                    || ggx.fresnel.reflectance(1.0).max_element() >= 0.2
+            }
+            Lobe::Clearcoat(coat) => coat.alpha <= super::ROUGHEST_FOLLOWED,
             _ => true,
         }
 }

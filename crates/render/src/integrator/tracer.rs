@@ -8,6 +8,8 @@ use firsthit_geometry::clip::ClipRegion;
 use glam::{DVec3, Vec3};
 
 use crate::light::{LightEnd, LightSample};
+use crate::material::Colors;
+use crate::sampler::{Dimension, PixelSampler};
 use crate::{EffectSet, RayCounts, RayKind, Stage};
 
 /// Time spent in rays of each kind, on pixels that are timed.
@@ -44,6 +46,7 @@ pub(crate) struct Tracer<'a, const TEXTURES: bool, const FILTERED: bool> {
     pub(crate) stage: &'a Stage,
     clip: Option<&'a ClipRegion<f64>>,
     shadows: bool,
+    disperses: bool,
     /// How near things must be to take even light away, where that is simulated.
     pub(super) occlusion_reach: Option<f64>,
     pub(crate) counts: RayCounts,
@@ -58,6 +61,7 @@ impl<'a, const TEXTURES: bool, const FILTERED: bool> Tracer<'a, TEXTURES, FILTER
             stage,
             clip: (!clip.is_all()).then_some(clip),
             shadows: stage.plan().simulated().contains(EffectSet::SHADOWS),
+            disperses: stage.plan().simulated().contains(EffectSet::DISPERSION),
             occlusion_reach: stage
                 .plan()
                 .simulated()
@@ -67,6 +71,11 @@ impl<'a, const TEXTURES: bool, const FILTERED: bool> Tracer<'a, TEXTURES, FILTER
             timing: Timing::default(),
             timed: false,
         }
+    }
+
+    /// Which colour a camera ray's path follows once colours are parted; nothing is drawn where they never are.
+    pub(super) fn colors(&self, sampler: PixelSampler) -> Colors {
+        if self.disperses { Colors::chosen_by(sampler.get1(Dimension::Color)) } else { Colors::All(1) }
     }
 
     /// The ray inside what is shown.

@@ -19,7 +19,7 @@ use crate::camera::Cone;
 use crate::light::power_heuristic;
 use crate::light::studio;
 use crate::material::lobes::{Lobe, LobeKind, LobeSample};
-use crate::material::{Material, Shading};
+use crate::material::{Colors, MAX_LOBES, Material, Shading};
 use crate::sampler::{Dimension, PixelSampler};
 use crate::stage::Backdrop;
 use crate::surface::Surface;
@@ -64,6 +64,8 @@ struct Pending {
     chosen: Option<Chosen>,
     /// Throughput that chance compares with.
     bright: f32,
+    /// Which colours it is about.
+    colors: Colors,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -106,6 +108,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
             straight: true,
             chosen: None,
             bright: 1.0,
+            colors: self.colors(sampler),
         }];
         while let Some(mut path) = pending.pop() {
             let hit = self.closest(path.kind, &path.ray, path.source);
@@ -155,7 +158,8 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
         let point = stage.accel.surface_point(&path.ray, hit);
         let wo = -path.ray.direction.as_vec3();
         let width = (path.cone.width + path.cone.spread * hit.t) as f32;
-        let surface = stage.world.surface(hit, point, wo, width);
+        let mut surface = stage.world.surface(hit, point, wo, width);
+        surface.colors = path.colors;
         let material = &stage.materials[stage.world.material(hit.id)];
 
         if FILTERED && material.has_alpha() {
@@ -178,7 +182,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
         if path.bounce >= limits.bounces || shading.bsdf.lobes().is_empty() {
             return;
         }
-        let mut followed = [false; 3];
+        let mut followed = [false; MAX_LOBES];
         for (f, lobe) in followed.iter_mut().zip(shading.bsdf.lobes()) {
             *f = is_followed(lobe, limits.follow, stage.reference);
         }
@@ -235,7 +239,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
         surface: &Surface<'_>,
         material: &Material,
         shading: &Shading,
-        followed: [bool; 3],
+        followed: [bool; MAX_LOBES],
         t: f64,
         pending: &mut Vec<Pending>,
     ) {
@@ -305,7 +309,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
         pending: &mut Vec<Pending>,
     ) {
         let direction = shading.bsdf.world(sample.wi).as_dvec3().normalize();
-        let through = lobe.kind() == LobeKind::TRANSMISSION;
+        let through = lobe.goes_through();
         // A shading normal may send a reflection below the surface, or a refraction above it.
         let side = direction.dot(surface.geometric.as_dvec3());
         if !(if through { side < 0.0 } else { side > 0.0 }) {
@@ -336,6 +340,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
             sampler,
             cone: Cone { width: path.cone.width + path.cone.spread * t, spread: path.cone.spread },
             absorption,
+            colors: if through && material.parts_colors { path.colors.parted() } else { path.colors },
             straight: path.straight && unbent,
             chosen: shared.map(|pdf| Chosen { pdf, from: surface.point.position, normal: shading.bsdf.normal }),
             bright: if bounce <= ROULETTE { throughput.max_element() } else { path.bright * lobe.scale() },

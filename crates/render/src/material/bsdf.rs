@@ -5,7 +5,8 @@ use glam::Vec3;
 use super::lobes::{Lambert, Lobe};
 use crate::warp;
 
-const MAX_LOBES: usize = 3;
+/// The most lobes that a surface has: diffuse, reflection, transmission, diffuse transmission, sheen, coat.
+pub(crate) const MAX_LOBES: usize = 6;
 
 /// The sum of a few lobes around a shading normal.
 #[derive(Clone, Copy, Debug)]
@@ -26,7 +27,15 @@ impl Bsdf {
         Self { x, y, normal, lobes: [none; MAX_LOBES], count: 0 }
     }
 
-    /// Adds a lobe: at most three.
+    /// Black, with an x axis along the surface that lies as near to `tangent` as the normal lets it.
+    pub(crate) fn along(normal: Vec3, tangent: Vec3) -> Self {
+        match (tangent - normal * normal.dot(tangent)).try_normalize() {
+            Some(x) => Self { x, y: normal.cross(x), ..Self::new(normal) },
+            None => Self::new(normal),
+        }
+    }
+
+    /// Adds a lobe: at most [`MAX_LOBES`].
     pub(crate) fn with(mut self, lobe: Lobe) -> Self {
         self.lobes[self.count] = lobe;
         self.count += 1;

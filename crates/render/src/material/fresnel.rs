@@ -2,6 +2,8 @@
 
 use glam::Vec3;
 
+use super::thin_film::Film;
+
 /// Unpolarised Fresnel reflectance of a boundary between dielectrics, 1 at total internal reflection.
 ///
 /// `cos` is that of the angle on this side, in 0..1; `eta` is the index of the other side over that of this side.
@@ -41,6 +43,15 @@ pub(crate) enum Fresnel {
         /// matters below 1: then the refracted angle counts, and there is total internal reflection.
         eta: f32,
     },
+    /// A thin film over what Schlick's law would give.
+    Film {
+        /// Reflectance along the normal without the film.
+        f0: Vec3,
+        /// Reflectance along the surface without the film.
+        f90: Vec3,
+        /// The film.
+        film: Film,
+    },
     /// The exact law for dielectrics: see [`dielectric`].
     Dielectric {
         /// Index of the other side over that of this side.
@@ -63,7 +74,32 @@ impl Fresnel {
                     None => Vec3::ONE,
                 }
             }
+            Self::Film { f0, f90, film } => {
+                let x = (1.0 - cos).clamp(0.0, 1.0);
+                let bare = f0 + (f90 - f0) * (x * x * x * x * x);
+                bare.lerp(film.reflectance(f0, cos) * f90.max_element(), film.factor)
+            }
             Self::Dielectric { eta } => Vec3::splat(dielectric(cos, eta)),
+        }
+    }
+
+    /// The law by which a diffuse base loses what is reflected above it: where reflection has a colour of its own
+    /// (KHR_materials_specular), by the largest channel, so that the base does not take on the opposite colour.
+    pub(crate) fn over_diffuse(self, colored: bool) -> Self {
+        match self {
+            Self::Schlick { f0, f90, eta } if colored => {
+                Self::Schlick { f0: Vec3::splat(f0.max_element()), f90: Vec3::splat(f90.max_element()), eta }
+            }
+            _ => self,
+        }
+    }
+
+    /// What is not reflected. Below a film, whose hues are not those of an absorption, it has no colour.
+    pub(crate) fn passed(&self, cos: f32) -> Vec3 {
+        let reflected = self.reflectance(cos);
+        match self {
+            Self::Film { .. } => Vec3::splat((1.0 - reflected.max_element()).max(0.0)),
+            _ => (Vec3::ONE - reflected).max(Vec3::ZERO),
         }
     }
 }

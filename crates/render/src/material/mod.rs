@@ -1,17 +1,22 @@
 //! Materials: compiled from the scene's descriptions, evaluated at a hit into the lobes that scatter there.
 
 mod bsdf;
+pub(crate) mod dispersion;
+mod energy;
 pub(crate) mod fresnel;
+pub(crate) mod layers;
 pub(crate) mod lobes;
 mod microfacet;
 mod pbr;
+mod thin_film;
 
 use std::sync::Arc;
 
 use firsthit_import::scene::{ImageDesc, MaterialDesc, MaterialModel, TextureRef};
 use glam::Vec3;
 
-pub(crate) use bsdf::Bsdf;
+pub(crate) use bsdf::{Bsdf, MAX_LOBES};
+pub(crate) use dispersion::Colors;
 use fresnel::Fresnel;
 use lobes::{GgxReflection, GgxTransmission, Lambert, Lobe, SpecularReflection, SpecularTransmission};
 use microfacet::Masking;
@@ -31,6 +36,8 @@ pub(crate) struct Conventions {
     pub(crate) reference: bool,
     /// Effects that are left out are not compiled into the materials.
     pub(crate) effects: EffectSet,
+    /// Light that bounces between the facets of rough glTF materials is not lost.
+    pub(crate) energy_compensation: bool,
 }
 
 /// A material, ready to be evaluated.
@@ -44,16 +51,25 @@ pub(crate) struct Material {
     pub(crate) solid: bool,
     /// Index of refraction of the solid.
     pub(crate) ior: f32,
+    /// Light of different colours goes through in different directions.
+    pub(crate) parts_colors: bool,
 }
 
 #[derive(Clone, Debug)]
 enum Model {
     Pbr(Box<Pbr>),
+    /// With layers over its base: shaded by code of its own, so that plain materials pay nothing for it.
+    Layered(Box<Pbr>),
     Diffuse(Vec3),
     Mirror(Vec3),
     Glass,
-    RoughMirror { alpha: f32, reflectance: Vec3 },
-    RoughGlass { alpha: f32 },
+    RoughMirror {
+        alpha: f32,
+        reflectance: Vec3,
+    },
+    RoughGlass {
+        alpha: f32,
+    },
     Emission(Vec3),
 }
 
@@ -101,7 +117,14 @@ impl Material {
         textures: &mut Textures<'_>,
         conventions: Conventions,
     ) -> Result<Self, StageError> {
-        let mut material = Self { model: Model::Glass, conventions, absorption: Vec3::ZERO, solid: false, ior: 1.0 };
+        let mut material = Self {
+            model: Model::Glass,
+            conventions,
+            absorption: Vec3::ZERO,
+            solid: false,
+            ior: 1.0,
+            parts_colors: false,
+        };
         material.model = match &desc.model {
             MaterialModel::Pbr(desc) => {
                 let pbr = Pbr::new(desc, textures, conventions)?;
@@ -109,8 +132,9 @@ impl Material {
                     material.solid = true;
                     material.ior = desc.ior;
                     material.absorption = pbr::absorption(desc, conventions);
+                    material.parts_colors = pbr.parts_colors();
                 }
-                Model::Pbr(Box::new(pbr))
+                if pbr.is_layered() { Model::Layered(Box::new(pbr)) } else { Model::Pbr(Box::new(pbr)) }
             }
             MaterialModel::Diffuse { albedo } => Model::Diffuse(*albedo),
             MaterialModel::Mirror { reflectance } => Model::Mirror(*reflectance),
@@ -134,7 +158,7 @@ impl Material {
     }
 
     fn pbr(&self) -> Option<&Pbr> {
-        if let Model::Pbr(pbr) = &self.model { Some(pbr) } else { None }
+        if let Model::Pbr(pbr) | Model::Layered(pbr) = &self.model { Some(pbr) } else { None }
     }
 
     /// Whether its back faces are not there, as glTF says of single-sided materials. That holds for shadow rays too:
@@ -158,7 +182,7 @@ impl Material {
         !self.conventions.reference
             && match &self.model {
                 Model::Glass | Model::RoughGlass { .. } => true,
-                Model::Pbr(pbr) => pbr.is_clear(),
+                Model::Pbr(pbr) | Model::Layered(pbr) => pbr.is_clear(),
                 _ => false,
             }
     }
@@ -178,7 +202,7 @@ impl Material {
                 // From either side the angle outside counts; the ray is taken as not bent.
                 Vec3::splat(1.0 - fresnel::dielectric(cos, self.ior.max(1.0)))
             }
-            Model::Pbr(pbr) => pbr.straight_through::<TEXTURES>(surface, cos),
+            Model::Pbr(pbr) | Model::Layered(pbr) => pbr.straight_through::<TEXTURES>(surface, cos),
             _ => Vec3::ZERO,
         }
     }
@@ -186,7 +210,7 @@ impl Material {
     /// Whether the surface glows.
     pub(crate) fn glows(&self) -> bool {
         match &self.model {
-            Model::Pbr(pbr) => pbr.glows(),
+            Model::Pbr(pbr) | Model::Layered(pbr) => pbr.glows(),
             Model::Emission(radiance) => radiance.max_element() > 0.0,
             _ => false,
         }
@@ -200,7 +224,9 @@ impl Material {
     /// Radiance sent to the viewer by the surface itself.
     pub(crate) fn emission<const TEXTURES: bool>(&self, surface: &Surface<'_>) -> Vec3 {
         match &self.model {
-            Model::Pbr(pbr) if surface.front || pbr.double_sided => pbr.emission::<TEXTURES>(surface),
+            Model::Pbr(pbr) | Model::Layered(pbr) if surface.front || pbr.double_sided => {
+                pbr.emission::<TEXTURES>(surface)
+            }
             Model::Emission(radiance) if surface.front => *radiance,
             _ => Vec3::ZERO,
         }
@@ -211,7 +237,8 @@ impl Material {
         let emission = self.emission::<TEXTURES>(surface);
         let normal = surface.smooth;
         let (bsdf, base_color) = match &self.model {
-            Model::Pbr(pbr) => return pbr.shade::<TEXTURES>(surface, self.conventions, emission),
+            Model::Pbr(pbr) => return pbr.shade::<TEXTURES, false>(surface, self.conventions, emission),
+            Model::Layered(pbr) => return pbr.shade::<TEXTURES, true>(surface, self.conventions, emission),
             Model::Diffuse(albedo) => {
                 (Bsdf::new(normal).with(Lobe::Lambert(Lambert { albedo: *albedo, coat: None })), *albedo)
             }
@@ -234,15 +261,16 @@ impl Material {
             }
             Model::RoughMirror { alpha, reflectance } => {
                 let fresnel = Fresnel::Constant(*reflectance);
-                let lobe = GgxReflection { alpha: *alpha, fresnel, masking: Masking::Correlated };
+                let lobe = GgxReflection { alpha: *alpha, fresnel, masking: Masking::Correlated, scale: Vec3::ONE };
                 (Bsdf::new(self.bent(surface)).with(Lobe::GgxReflection(lobe)), *reflectance)
             }
             Model::RoughGlass { alpha } => {
                 let eta = self.eta(surface);
                 let (alpha, fresnel) = (*alpha, Fresnel::Dielectric { eta });
                 let transmission = GgxTransmission { alpha, eta, fresnel, tint: Vec3::ONE, scale: self.scaling(eta) };
+                let reflection = GgxReflection { alpha, fresnel, masking: Masking::Separate, scale: Vec3::ONE };
                 let bsdf = Bsdf::new(self.bent(surface))
-                    .with(Lobe::GgxReflection(GgxReflection { alpha, fresnel, masking: Masking::Separate }))
+                    .with(Lobe::GgxReflection(reflection))
                     .with(Lobe::GgxTransmission(transmission));
                 (bsdf, Vec3::ONE)
             }

@@ -3,15 +3,22 @@
 //! The core is appendix B of the glTF 2.0 specification as its sample implementation has it; the extensions ior,
 //! specular, transmission, volume, emissive_strength and unlit follow their own texts, with two liberties that a ray
 //! tracer wants: solids (volume) refract and absorb along the real way through the mesh instead of `thickness`, and
-//! seen from inside, Schlick's formula takes the refracted angle, so that total internal reflection is right.
+//! seen from inside, Schlick's formula takes the refracted angle, so that total internal reflection is right. What other
+//! extensions lay over the base or let through it is in [`super::layers`].
+//!
+//! From the top: clear coat, sheen, then the base, of which a film, if there is one, is the reflectance. A layer leaves
+//! to those below what it does not reflect itself towards the viewer.
 
 use firsthit_import::scene::{AlphaMode, PbrMaterial};
-use glam::{Vec3, Vec3Swizzles, Vec4Swizzles};
+use glam::{Vec3, Vec4Swizzles};
 
 use super::fresnel::{Fresnel, normal_incidence};
-use super::lobes::{GgxReflection, GgxTransmission, Lambert, Lobe, SpecularTransmission, ThinTransmission};
+use super::layers::{self, Layers};
+use super::lobes::{
+    AnisotropicGgx, GgxReflection, GgxTransmission, Lambert, Lobe, SpecularTransmission, ThinTransmission,
+};
 use super::microfacet::Masking;
-use super::{Bsdf, Conventions, LEAST_ALPHA, Shading, Textures};
+use super::{Bsdf, Conventions, LEAST_ALPHA, Shading, Textures, energy};
 use crate::surface::Surface;
 use crate::texture::{ColorSpace, TextureLookup};
 use crate::{EffectSet, StageError};
@@ -43,6 +50,10 @@ pub(super) struct Pbr {
     specular_texture: Option<TextureLookup>,
     specular_color: Vec3,
     specular_color_texture: Option<TextureLookup>,
+    /// 20 / Abbe number.
+    dispersion: f32,
+    /// What it calls for beside its base.
+    layers: Option<Box<Layers>>,
 }
 
 /// What is taken away per unit of length, so that white turns into the attenuation colour over its distance.
@@ -57,14 +68,14 @@ pub(super) fn absorption(desc: &PbrMaterial, conventions: Conventions) -> Vec3 {
 }
 
 /// The share of the colour texture, scalar textures and vertex colour of a point: 1 where there is none.
-fn scalar<const TEXTURES: bool>(lookup: Option<&TextureLookup>, surface: &Surface<'_>) -> f32 {
+pub(super) fn scalar<const TEXTURES: bool>(lookup: Option<&TextureLookup>, surface: &Surface<'_>) -> f32 {
     match lookup {
         Some(t) if TEXTURES => t.scalar(surface.uv(t.uv_set()), surface.footprint(t.uv_set())),
         _ => 1.0,
     }
 }
 
-fn color<const TEXTURES: bool>(lookup: Option<&TextureLookup>, surface: &Surface<'_>) -> glam::Vec4 {
+pub(super) fn color<const TEXTURES: bool>(lookup: Option<&TextureLookup>, surface: &Surface<'_>) -> glam::Vec4 {
     match lookup {
         Some(t) if TEXTURES => t.color(surface.uv(t.uv_set()), surface.footprint(t.uv_set())),
         _ => glam::Vec4::ONE,
@@ -79,6 +90,7 @@ impl Pbr {
     ) -> Result<Self, StageError> {
         let has = |effect| conventions.effects.contains(effect);
         let textured = has(EffectSet::TEXTURES);
+        let layers = Layers::new(desc, textures, conventions)?;
         let mut get =
             |texture: &Option<_>, space, wanted: bool| textures.get(texture.as_ref().filter(|_| wanted), space);
         let transmission =
@@ -112,11 +124,24 @@ impl Pbr {
             specular_texture: get(&desc.specular_texture, ColorSpace::Linear, textured)?,
             specular_color: desc.specular_color,
             specular_color_texture: get(&desc.specular_color_texture, ColorSpace::Srgb, textured)?,
+            dispersion: if has(EffectSet::DISPERSION) { desc.dispersion } else { 0.0 },
+            layers,
         })
     }
 
     pub(super) fn is_solid(&self) -> bool {
-        self.solid && self.transmission > 0.0 && !self.unlit
+        let open = self.transmission > 0.0 || self.layers.as_ref().is_some_and(|l| l.lets_light_through());
+        self.solid && open && !self.unlit
+    }
+
+    /// Whether light of different colours goes on in different directions.
+    pub(super) fn parts_colors(&self) -> bool {
+        self.dispersion > 0.0 && self.solid && self.transmission > 0.0 && !self.unlit
+    }
+
+    /// Whether it has anything beside its base.
+    pub(super) fn is_layered(&self) -> bool {
+        self.layers.is_some() && !self.unlit
     }
 
     pub(super) fn has_alpha(&self) -> bool {
@@ -174,7 +199,9 @@ impl Pbr {
         Fresnel::Schlick { f0: f0.lerp(base, metallic), f90: Vec3::splat(specular).lerp(Vec3::ONE, metallic), eta }
     }
 
-    pub(super) fn shade<const TEXTURES: bool>(
+    /// `LAYERS`: whether what is laid over the base is looked at. Materials that have nothing there are shaded by code
+    /// that knows of nothing.
+    pub(super) fn shade<const TEXTURES: bool, const LAYERS: bool>(
         &self,
         surface: &Surface<'_>,
         conventions: Conventions,
@@ -184,6 +211,7 @@ impl Pbr {
         if self.unlit {
             return Shading { bsdf: Bsdf::new(surface.smooth), emission, base_color: base };
         }
+        let layers = self.layers.as_deref().filter(|_| LAYERS);
         let mut normal = self.normal::<TEXTURES>(surface);
         if !conventions.reference {
             normal = surface.bent(normal);
@@ -193,23 +221,56 @@ impl Pbr {
         let transmission =
             (self.transmission * scalar::<TEXTURES>(self.transmission_texture.as_ref(), surface)).clamp(0.0, 1.0);
         let alpha = (roughness * roughness).max(LEAST_ALPHA);
-        let ior = if self.ior > 0.0 { self.ior } else { 1.0 };
-        let eta = match (self.is_solid(), surface.front) {
-            (false, _) => 1.0,
-            (true, true) => ior,
-            (true, false) => 1.0 / ior,
-        };
-        let fresnel = self.fresnel::<TEXTURES>(surface, base, metallic, eta);
+        let (eta, parted) = self.boundary(surface);
+        let cos = normal.dot(surface.wo);
 
-        let mut bsdf = Bsdf::new(normal);
-        let diffuse = base * ((1.0 - metallic) * (1.0 - transmission));
+        let bare = self.fresnel::<TEXTURES>(surface, base, metallic, eta);
+        let fresnel = layers.map_or(bare, |l| l.filmed::<TEXTURES>(surface, bare));
+        let coat = fresnel.over_diffuse(self.specular_color != Vec3::ONE || self.specular_color_texture.is_some());
+        let compensation = match bare {
+            Fresnel::Schlick { f0, .. } if conventions.energy_compensation => energy::compensation(cos, roughness, f0),
+            _ => Vec3::ONE,
+        };
+        let brush = layers.and_then(|l| l.brush::<TEXTURES>(surface));
+        let mut bsdf = match &brush {
+            Some(brush) => Bsdf::along(normal, brush.direction),
+            None => Bsdf::new(normal),
+        };
+        // Layers on top, and what they leave of the light below.
+        let mut below = 1.0;
+        let (mut over, mut fibres) = (None, None);
+        if let Some(layers) = layers {
+            if let Some((lobe, passed)) = layers.coat::<TEXTURES>(surface, !conventions.reference, |w| bsdf.local(w)) {
+                (over, below) = (Some(lobe), passed);
+            }
+            if let Some((mut sheen, passed)) = layers.sheen::<TEXTURES>(surface, cos) {
+                sheen.color *= below;
+                below *= passed;
+                fibres = Some(Lobe::Sheen(sheen));
+            }
+        }
+
+        let mut diffuse = base * ((1.0 - metallic) * (1.0 - transmission) * below);
+        let mut through = None;
+        if let Some((mut lobe, share)) = layers.and_then(|l| l.through::<TEXTURES>(surface, coat)) {
+            diffuse *= 1.0 - share;
+            lobe.color *= (1.0 - metallic) * (1.0 - transmission) * below;
+            through = Some(lobe).filter(|l| l.color.max_element() > 0.0).map(Lobe::DiffuseTransmission);
+        }
         if diffuse.max_element() > 0.0 {
-            bsdf = bsdf.with(Lobe::Lambert(Lambert { albedo: diffuse, coat: Some(fresnel) }));
+            bsdf = bsdf.with(Lobe::Lambert(Lambert { albedo: diffuse, coat: Some(coat) }));
         }
         if fresnel.reflectance(0.0).max_element() > 0.0 || fresnel.reflectance(1.0).max_element() > 0.0 {
-            bsdf = bsdf.with(Lobe::GgxReflection(GgxReflection { alpha, fresnel, masking: Masking::Correlated }));
+            let scale = compensation * below;
+            bsdf = bsdf.with(match &brush {
+                Some(brush) => {
+                    let along = alpha + (1.0 - alpha) * brush.strength * brush.strength;
+                    Lobe::AnisotropicGgx(AnisotropicGgx { alpha: glam::Vec2::new(along, alpha), fresnel, scale })
+                }
+                None => Lobe::GgxReflection(GgxReflection { alpha, fresnel, masking: Masking::Correlated, scale }),
+            });
         }
-        let tint = base * ((1.0 - metallic) * transmission);
+        let tint = base * ((1.0 - metallic) * transmission * below) * parted;
         if tint.max_element() > 0.0 {
             let smooth = alpha <= LEAST_ALPHA;
             bsdf = bsdf.with(if (eta - 1.0).abs() > 1e-3 {
@@ -225,7 +286,24 @@ impl Pbr {
                 Lobe::ThinTransmission(ThinTransmission { alpha, fresnel, tint })
             });
         }
+        for lobe in [through, fibres, over].into_iter().flatten() {
+            bsdf = bsdf.with(lobe);
+        }
         Shading { bsdf, emission, base_color: base }
+    }
+
+    /// Index of the other side over that of the viewer's, of solids; and what light that goes through keeps there by
+    /// being parted into colours.
+    fn boundary(&self, surface: &Surface<'_>) -> (f32, Vec3) {
+        if !self.is_solid() {
+            return (1.0, Vec3::ONE);
+        }
+        let mut ior = if self.ior > 0.0 { self.ior } else { 1.0 };
+        let mut share = Vec3::ONE;
+        if self.dispersion > 0.0 {
+            (ior, share) = (surface.colors.ior(ior, self.dispersion), surface.colors.share());
+        }
+        (if surface.front { ior } else { 1.0 / ior }, share)
     }
 
     /// The shading normal with normal and bump maps, on the viewer's side.
@@ -233,14 +311,7 @@ impl Pbr {
         if !TEXTURES || (self.normal_texture.is_none() && self.bump_texture.is_none()) {
             return surface.smooth;
         }
-        let mut normal = None;
-        if let Some(t) = &self.normal_texture {
-            let texel = t.color(surface.uv(t.uv_set()), surface.footprint(t.uv_set()));
-            let n = (texel.xyz() * 2.0 - 1.0) * Vec3::new(self.normal_scale, self.normal_scale, 1.0);
-            if n.is_finite() && n.xy() != glam::Vec2::ZERO {
-                normal = surface.mapped_normal(n, t.uv_set());
-            }
-        }
+        let mut normal = layers::mapped::<TEXTURES>(surface, self.normal_texture.as_ref(), self.normal_scale);
         if let Some(t) = &self.bump_texture {
             let (uv, width) = (surface.uv(t.uv_set()), surface.footprint(t.uv_set()));
             let step = t.texel_step().max(width);

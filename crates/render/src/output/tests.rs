@@ -97,7 +97,7 @@ fn exr_holds_colour_and_aovs_bit_by_bit() {
         let channel = layer.channel_data.list.iter().find(|c| c.name.eq(name)).unwrap();
         channel.sample_data.values_as_f32().collect()
     };
-    let of = |picture: crate::film::Picture, c: usize| -> Vec<f32> { picture.pixels.iter().map(|p| p[c]).collect() };
+    let of = |picture: Picture, c: usize| -> Vec<f32> { picture.pixels.iter().map(|p| p[c]).collect() };
     for (c, name) in ["R", "G", "B", "A"].into_iter().enumerate() {
         assert_eq!(channel(name), of(film.color(), c));
     }

@@ -21,7 +21,7 @@ impl Lambert {
         match self.coat {
             None => Vec3::ONE,
             Some(coat) => match (wo + wi).try_normalize() {
-                Some(h) => (Vec3::ONE - coat.reflectance(wo.dot(h).clamp(0.0, 1.0))).max(Vec3::ZERO),
+                Some(h) => coat.passed(wo.dot(h).clamp(0.0, 1.0)),
                 None => Vec3::ZERO,
             },
         }
@@ -44,6 +44,6 @@ impl Lambert {
     }
 
     pub(super) fn albedo(&self, wo: Vec3) -> Vec3 {
-        self.albedo * self.coat.map_or(Vec3::ONE, |coat| Vec3::ONE - coat.reflectance(wo.z))
+        self.albedo * self.coat.map_or(Vec3::ONE, |coat| coat.passed(wo.z))
     }
 }

@@ -15,6 +15,8 @@ pub(crate) struct GgxReflection {
     pub(crate) fresnel: Fresnel,
     /// Masking and shadowing.
     pub(crate) masking: Masking,
+    /// Multiplies all of it.
+    pub(crate) scale: Vec3,
 }
 
 impl GgxReflection {
@@ -23,7 +25,7 @@ impl GgxReflection {
             return Vec3::ZERO;
         }
         let h = (wo + wi).normalize();
-        let f = self.fresnel.reflectance(wo.dot(h).clamp(0.0, 1.0));
+        let f = self.fresnel.reflectance(wo.dot(h).clamp(0.0, 1.0)) * self.scale;
         f * (density(h, self.alpha) * g2(wo, wi, self.alpha, self.masking) / (4.0 * wo.z))
     }
 
@@ -42,12 +44,12 @@ impl GgxReflection {
         if !(cos > 0.0 && wo.z > 0.0 && wi.z > 0.0) {
             return None;
         }
-        let weight =
-            self.fresnel.reflectance(cos.min(1.0)) * (g2(wo, wi, self.alpha, self.masking) / g1(wo, self.alpha));
+        let f = self.fresnel.reflectance(cos.min(1.0)) * self.scale;
+        let weight = f * (g2(wo, wi, self.alpha, self.masking) / g1(wo, self.alpha));
         Some(LobeSample { wi, weight, pdf: Some(visible_pdf(wo, h, self.alpha) / (4.0 * cos)) })
     }
 
     pub(super) fn albedo(&self, wo: Vec3) -> Vec3 {
-        self.fresnel.reflectance(wo.z.clamp(0.0, 1.0))
+        self.fresnel.reflectance(wo.z.clamp(0.0, 1.0)) * self.scale
     }
 }

@@ -4,18 +4,26 @@
 //! light) point away from the surface. To add a lobe: a file with `eval`, `pdf` and `sample`, a variant of [`Lobe`],
 //! and a line in the tests below, which hold every lobe to the same rules.
 
+mod anisotropic;
+mod clearcoat;
 mod diffuse;
+mod diffuse_transmission;
 mod ggx;
 mod rough_glass;
+mod sheen;
 mod specular;
 mod thin;
 
 use bitflags::bitflags;
 use glam::Vec3;
 
+pub(crate) use anisotropic::AnisotropicGgx;
+pub(crate) use clearcoat::Clearcoat;
 pub(crate) use diffuse::Lambert;
+pub(crate) use diffuse_transmission::DiffuseTransmission;
 pub(crate) use ggx::GgxReflection;
 pub(crate) use rough_glass::GgxTransmission;
+pub(crate) use sheen::Sheen;
 pub(crate) use specular::{SpecularReflection, SpecularTransmission};
 pub(crate) use thin::ThinTransmission;
 
@@ -58,6 +66,14 @@ pub(crate) enum Lobe {
     GgxTransmission(GgxTransmission),
     /// A thin rough sheet.
     ThinTransmission(ThinTransmission),
+    /// A brushed mirror.
+    AnisotropicGgx(AnisotropicGgx),
+    /// A clear coat over the others.
+    Clearcoat(Clearcoat),
+    /// Fibres.
+    Sheen(Sheen),
+    /// Even in all directions of the other side.
+    DiffuseTransmission(DiffuseTransmission),
 }
 
 /// Calls a method of whichever lobe it is.
@@ -70,6 +86,10 @@ macro_rules! each {
             Lobe::GgxReflection($lobe) => $body,
             Lobe::GgxTransmission($lobe) => $body,
             Lobe::ThinTransmission($lobe) => $body,
+            Lobe::AnisotropicGgx($lobe) => $body,
+            Lobe::Clearcoat($lobe) => $body,
+            Lobe::Sheen($lobe) => $body,
+            Lobe::DiffuseTransmission($lobe) => $body,
         }
     };
 }
@@ -78,12 +98,20 @@ impl Lobe {
     /// What it does.
     pub(crate) fn kind(&self) -> LobeKind {
         match self {
-            Self::Lambert(_) => LobeKind::DIFFUSE,
-            Self::SpecularReflection(_) | Self::GgxReflection(_) => LobeKind::REFLECTION,
+            Self::Lambert(_) | Self::Sheen(_) => LobeKind::DIFFUSE,
+            Self::SpecularReflection(_) | Self::GgxReflection(_) | Self::AnisotropicGgx(_) | Self::Clearcoat(_) => {
+                LobeKind::REFLECTION
+            }
+            Self::DiffuseTransmission(_) => LobeKind::DIFFUSE.union(LobeKind::TRANSMISSION),
             Self::SpecularTransmission(_) | Self::GgxTransmission(_) | Self::ThinTransmission(_) => {
                 LobeKind::TRANSMISSION
             }
         }
+    }
+
+    /// Whether light goes through to the other side.
+    pub(crate) fn goes_through(&self) -> bool {
+        self.kind().contains(LobeKind::TRANSMISSION)
     }
 
     /// f(wo, wi) * |cos(wi)|; 0 for delta lobes.

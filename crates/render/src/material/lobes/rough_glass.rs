@@ -39,7 +39,7 @@ impl GgxTransmission {
     }
 
     fn passed(&self, cos: f32) -> Vec3 {
-        (Vec3::ONE - self.fresnel.reflectance(cos.clamp(0.0, 1.0))).max(Vec3::ZERO) * self.tint
+        self.fresnel.passed(cos.clamp(0.0, 1.0)) * self.tint
     }
 
     pub(super) fn eval(&self, wo: Vec3, wi: Vec3) -> Vec3 {

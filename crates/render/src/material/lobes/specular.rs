@@ -59,7 +59,7 @@ impl SpecularTransmission {
     }
 
     pub(super) fn albedo(&self, wo: Vec3) -> Vec3 {
-        (Vec3::ONE - self.fresnel.reflectance(wo.z)).max(Vec3::ZERO) * self.tint
+        self.fresnel.passed(wo.z) * self.tint
     }
 }
 

@@ -3,14 +3,23 @@
 
 use std::f64::consts::{PI, TAU};
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
-use super::{GgxReflection, GgxTransmission, Lambert, Lobe, ThinTransmission};
+use super::{
+    AnisotropicGgx, Clearcoat, DiffuseTransmission, GgxReflection, GgxTransmission, Lambert, Lobe, Sheen,
+    ThinTransmission,
+};
 use crate::material::fresnel::Fresnel;
 use crate::material::microfacet::Masking;
+use crate::material::thin_film::Film;
 
 fn schlick() -> Fresnel {
     Fresnel::Schlick { f0: Vec3::new(0.04, 0.3, 0.9), f90: Vec3::ONE, eta: 1.0 }
+}
+
+fn filmed() -> Fresnel {
+    let film = Film { factor: 0.8, outside: 1.0, ior: 1.3, thickness: 400.0 };
+    Fresnel::Film { f0: Vec3::new(0.04, 0.3, 0.9), f90: Vec3::ONE, film }
 }
 
 /// All lobes that are not delta functions, with their names.
@@ -21,7 +30,7 @@ fn lobes() -> Vec<(String, Lobe)> {
     ];
     for alpha in [0.1f32, 0.3, 1.0] {
         for masking in [Masking::Correlated, Masking::Separate] {
-            let lobe = GgxReflection { alpha, fresnel: schlick(), masking };
+            let lobe = GgxReflection { alpha, fresnel: schlick(), masking, scale: Vec3::ONE };
             all.push((format!("GGX {alpha} {masking:?}"), Lobe::GgxReflection(lobe)));
         }
         for eta in [1.5f32, 1.0 / 1.5] {
@@ -31,7 +40,19 @@ fn lobes() -> Vec<(String, Lobe)> {
         }
         let lobe = ThinTransmission { alpha, fresnel: schlick(), tint: Vec3::new(1.0, 0.5, 0.2) };
         all.push((format!("thin {alpha}"), Lobe::ThinTransmission(lobe)));
+        let lobe = GgxReflection { alpha, fresnel: filmed(), masking: Masking::Correlated, scale: Vec3::ONE };
+        all.push((format!("iridescent {alpha}"), Lobe::GgxReflection(lobe)));
+        let coat = Clearcoat { weight: 0.7, alpha, normal: Vec3::Z };
+        all.push((format!("coat {alpha}"), Lobe::Clearcoat(coat)));
+        let tilted = Clearcoat { weight: 1.0, alpha, normal: Vec3::new(0.2, 0.1, 0.9).normalize() };
+        all.push((format!("tilted coat {alpha}"), Lobe::Clearcoat(tilted)));
+        let brushed = AnisotropicGgx { alpha: Vec2::new(0.8, alpha), fresnel: schlick(), scale: Vec3::ONE };
+        all.push((format!("brushed {alpha}"), Lobe::AnisotropicGgx(brushed)));
+        let sheen = Sheen::new(Vec3::new(1.0, 0.5, 0.1), alpha.sqrt());
+        all.push((format!("sheen {alpha}"), Lobe::Sheen(sheen)));
     }
+    let through = DiffuseTransmission { color: Vec3::new(1.0, 0.5, 0.1), coat: schlick() };
+    all.push(("diffuse transmission".into(), Lobe::DiffuseTransmission(through)));
     all
 }
 
@@ -175,10 +196,11 @@ fn makes_no_light() {
 fn reflection_and_thin_transmission_are_reciprocal() {
     let mut random = Random(5);
     for (name, lobe) in lobes() {
-        if matches!(lobe, Lobe::GgxTransmission(_)) {
+        // As every normal map, a coat with a normal of its own is reciprocal about that one only.
+        if matches!(lobe, Lobe::GgxTransmission(_)) || matches!(lobe, Lobe::Clearcoat(c) if c.normal != Vec3::Z) {
             continue;
         }
-        let thin = matches!(lobe, Lobe::ThinTransmission(_));
+        let thin = lobe.goes_through();
         for _ in 0..500 {
             let a = direction(f64::from(random.next()), f64::from(random.next()) * TAU);
             let b = direction(f64::from(random.next()), f64::from(random.next()) * TAU);

@@ -19,13 +19,14 @@ pub(crate) struct ThinTransmission {
 
 impl ThinTransmission {
     fn mirrored(&self) -> GgxReflection {
-        GgxReflection { alpha: self.alpha, fresnel: Fresnel::Constant(Vec3::ONE), masking: Masking::Correlated }
+        let fresnel = Fresnel::Constant(Vec3::ONE);
+        GgxReflection { alpha: self.alpha, fresnel, masking: Masking::Correlated, scale: Vec3::ONE }
     }
 
     /// What goes through when `up` is the mirror image of where the light comes from.
     fn passed(&self, wo: Vec3, up: Vec3) -> Vec3 {
         let cos = wo.dot((wo + up).normalize()).clamp(0.0, 1.0);
-        (Vec3::ONE - self.fresnel.reflectance(cos)).max(Vec3::ZERO) * self.tint
+        self.fresnel.passed(cos) * self.tint
     }
 
     pub(super) fn eval(&self, wo: Vec3, wi: Vec3) -> Vec3 {
@@ -44,6 +45,6 @@ impl ThinTransmission {
     }
 
     pub(super) fn albedo(&self, wo: Vec3) -> Vec3 {
-        (Vec3::ONE - self.fresnel.reflectance(wo.z)).max(Vec3::ZERO) * self.tint
+        self.fresnel.passed(wo.z) * self.tint
     }
 }
