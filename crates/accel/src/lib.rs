@@ -25,6 +25,7 @@
 
 #![deny(unsafe_code)]
 
+mod above;
 mod build;
 mod build_options;
 mod builder;

@@ -1,21 +1,19 @@
 //! The scene: built once, then only asked.
 
-use core::ops::{ControlFlow, Range};
+use core::ops::ControlFlow;
 use std::sync::Arc;
 
-use firsthit_geometry::{Aabb, Ray, Real, slab::Slabs};
+use firsthit_geometry::{Aabb, Ray, Real};
 use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 
-use crate::build::Topology;
+use crate::above::{Above, Asked};
 use crate::instance::{Instance, tight_boxes};
 use crate::kernel::Kernel;
-use crate::layout::{Bvh2, Tree};
 use crate::local::LocalRay;
 use crate::model::{Model, PrimitiveId, Surface, limit};
 use crate::query::{Any, Closest, Collect, Collector, Dyn, ForKernel};
 use crate::stats::{Off, Probe, Watch};
-use crate::traverse::traverse;
 use crate::{BuildError, BuildOptions, Crossings, Geometry, Hit, HitId, TraversalCounts};
 
 /// What a scene's trees are like.
@@ -52,9 +50,9 @@ pub(crate) struct Inner {
     placed: Vec<(usize, DAffine3)>,
     pub(crate) instances: Vec<Instance>,
     /// Over the instances with something bounded in them.
-    tree: Bvh2<f64>,
-    /// Instances in the order of the tree's leaves.
-    order: Vec<u32>,
+    above: Above,
+    /// Those instances.
+    bounded: Vec<u32>,
     /// Instances of models with shapes of no finite box, which are tested outside the tree.
     unbounded: Vec<u32>,
     bounds: Aabb<f64>,
@@ -102,17 +100,15 @@ impl Scene {
                 instance.padded_box(&models[instance.model as usize], &tight[i as usize])
             })
             .collect();
-        let topology = Topology::new(&relative(&boxes), options.quality);
-        let tree = Bvh2::new(&topology, &boxes);
+        let above = Above::new(&boxes, options);
         let unbounded = (0..instances.len() as u32)
             .filter(|&i| models[instances[i as usize].model as usize].has_unbounded())
             .collect();
-        let order = topology.order.iter().map(|&i| bounded[i as usize]).collect();
-
         let round_trip = instances.iter().fold(0.0, |most: f64, i| most.max(i.transform.round_trip()));
         let stats = SceneStats::default();
-        let mut inner = Inner { options, models, placed, instances, tree, order, unbounded, bounds, round_trip, stats };
-        inner.stats = inner.stats(topology.depth());
+        let mut inner =
+            Inner { options, models, placed, instances, above, bounded, unbounded, bounds, round_trip, stats };
+        inner.stats = inner.stats();
         Ok(Self { inner: Arc::new(inner) })
     }
 
@@ -278,28 +274,22 @@ impl Inner {
         // A distance in the world has gone through an instance and back: a few roundings more than a box's entry.
         let beyond = |t: f64| t + t.abs() * (64.0 * f64::UNIT_ROUNDOFF);
         let before = ray.t_min - ray.t_min.abs() * (64.0 * f64::UNIT_ROUNDOFF);
-        let t_max = beyond(collector.t_max());
-        let mut leaf = |range: Range<usize>, probe: &mut P| {
-            for &i in &self.order[range] {
+        let asked = Asked {
+            off: self.entering(ray),
+            padded: K::PADDED_ABOVE,
+            ordered: collector.ordered(),
+            t_min: before,
+            t_max: beyond(collector.t_max()),
+        };
+        self.above.traverse(ray, &asked, probe, |run, probe| {
+            for &k in run {
+                let i = self.bounded[k as usize];
                 let instance = &self.instances[i as usize];
                 let model = &self.models[instance.model as usize];
                 model.trace::<SURFACES, K, C, P>(ray, (i, &instance.transform), precision, collector, probe)?;
             }
             ControlFlow::Continue(beyond(collector.t_max()))
-        };
-        match self.tree.root() {
-            Some(root) if root.is_leaf() => leaf(root.range(), probe).map_continue(drop),
-            _ if !ray.is_valid() => ControlFlow::Continue(()),
-            _ => {
-                let slabs = Slabs::new(ray.origin, ray.direction);
-                if K::PADDED_ABOVE {
-                    let slabs = slabs.widened(self.entering(ray));
-                    traverse::<true, _, _, _>(&self.tree, &slabs, before, t_max, probe, leaf)
-                } else {
-                    traverse::<false, _, _, _>(&self.tree, &slabs, before, t_max, probe, leaf)
-                }
-            }
-        }
+        })
     }
 
     /// How far from the ray, in each axis, the ray may lie that an instance's tests see: it is rounded on its way there,
@@ -310,7 +300,7 @@ impl Inner {
         DVec3::splat(farthest * self.round_trip)
     }
 
-    fn stats(&self, depth: u32) -> SceneStats {
+    fn stats(&self) -> SceneStats {
         let stored = |m: &Model| m.triangle_count();
         let weight: u64 = self.models.iter().map(|m| stored(m)).sum();
         let cost: f64 = self.models.iter().map(|m| m.sah_cost() * m.triangle_count() as f64).sum();
@@ -320,8 +310,8 @@ impl Inner {
             instanced_triangles: self.instances.iter().map(|i| stored(&self.models[i.model as usize])).sum(),
             instances: self.instances.len() as u64,
             sah_cost: if weight > 0 { cost / weight as f64 } else { 0.0 },
-            depth: depth + self.models.iter().map(|m| m.depth()).max().unwrap_or(0),
-            bytes: (models + self.tree.bytes() + size_of_val(self.instances.as_slice())) as u64,
+            depth: self.above.depth() + self.models.iter().map(|m| m.depth()).max().unwrap_or(0),
+            bytes: (models + self.above.bytes() + size_of_val(self.instances.as_slice())) as u64,
             degenerate_triangles: self.models.iter().map(|m| m.degenerate()).sum(),
         }
     }
@@ -348,16 +338,4 @@ impl<const SURFACES: bool, C: Collector, P: Probe> ForKernel for Trace<'_, SURFA
 #[inline(always)]
 pub(crate) fn is_interval(ray: &Ray<f64>) -> bool {
     ray.t_min <= ray.t_max
-}
-
-/// Boxes as the builder wants them: f32, about the middle of all and of size near 1. Only the tree's shape comes from
-/// them, so their rounding does not matter.
-fn relative(boxes: &[Aabb<f64>]) -> Vec<Aabb<f32>> {
-    let all = boxes.iter().fold(Aabb::empty(), |a, b| a.union(*b));
-    if all.is_empty() {
-        return Vec::new();
-    }
-    let center = all.center();
-    let scale = 1.0 / all.extent().max_element().power_of_two_below();
-    boxes.iter().map(|b| Aabb::new((b.min - center) * scale, (b.max - center) * scale).to_f32_outward()).collect()
 }

@@ -34,7 +34,8 @@ pub(crate) struct Reference(pub(crate) u32);
 
 impl Reference {
     pub(crate) const NOTHING: Self = Self(u32::MAX);
-    const LEAF: u32 = 1 << 31;
+    /// The bit of leaves.
+    pub(crate) const LEAF: u32 = 1 << 31;
 
     pub(super) fn node(index: usize) -> Self {
         Self(index as u32)
