@@ -64,13 +64,13 @@ impl Plane {
 /// The ray meets a plane more steeply if the cosine between it and the normal is larger than 1/4. Then a point of the
 /// plane on the ray is no farther than `1 + sqrt(3) * 4`, less than 8, times [`LocalRay::reach`] from the triangle that
 /// the test has accepted, and [`LocalRay::delta`] covers that.
-const STEEP: f64 = 1.0 / 16.0;
+pub(crate) const STEEP: f64 = 1.0 / 16.0;
 
 /// Triangles of a smaller sine (squared) between their edges are never met the shortest way.
-const SLIVER: f64 = 1.0 / (1u64 << 40) as f64;
+pub(crate) const SLIVER: f64 = 1.0 / (1u64 << 40) as f64;
 
 /// 28 digits of `t` are left, some more than `f32` has: see [`plane`].
-const MOST: f64 = 4.0 / (1u64 << 20) as f64;
+pub(crate) const MOST: f64 = 4.0 / (1u64 << 20) as f64;
 
 /// Few digits are lost.
 const LEAST: f64 = 1.0 / 32.0;

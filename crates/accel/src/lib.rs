@@ -39,6 +39,7 @@ mod local;
 mod model;
 mod normalise;
 mod order;
+mod packet;
 mod query;
 pub mod reference;
 mod refit;

@@ -29,10 +29,10 @@ use firsthit_geometry::{
 use glam::{DVec3, Vec3};
 
 /// Unit roundoff of `f32`.
-const U: f64 = f32::UNIT_ROUNDOFF as f64;
+pub(crate) const U: f64 = f32::UNIT_ROUNDOFF as f64;
 
 /// How far outside a ray may be moved nearer, and where to: multiples of the object's half size.
-const FAR: f64 = 8.0;
+pub(crate) const FAR: f64 = 8.0;
 
 /// Half the difference between an object's box and the box that is put into the tree over instances, in each axis: more
 /// than eight times any [`LocalRay::reach`].
@@ -43,7 +43,7 @@ pub(crate) fn instance_padding(bounds: &Aabb<f64>) -> DVec3 {
 
 /// In units of a normalised object, of size near 1: covers directions so small that their rounding to `f32` is not
 /// relative.
-const TINY: f64 = 1.0 / (1u64 << 40) as f64;
+pub(crate) const TINY: f64 = 1.0 / (1u64 << 40) as f64;
 
 /// The largest component by magnitude; where one is NaN, some.
 #[inline(always)]
@@ -78,6 +78,12 @@ impl Extent {
         }
         let center = bounds.center();
         Self { center, magnitude: largest(center), half: half_size(bounds) }
+    }
+
+    /// Its centre, the largest coordinate of that, and half the longest side.
+    #[inline(always)]
+    pub(crate) fn parts(&self) -> ([f64; 3], f64, f64) {
+        (self.center.to_array(), self.magnitude, self.half)
     }
 }
 

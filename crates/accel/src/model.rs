@@ -16,12 +16,12 @@ use crate::layout::Bvh2;
 use crate::layout::wide8::{self, Wide8};
 use crate::local::{Extent, LocalRay};
 use crate::normalise::common_scale;
-use crate::query::{Candidate, Collector, Dyn};
+use crate::query::{Candidate, Closest, Collect, Collector, Dyn};
 use crate::simd::{self, Available, Lanes, Work};
-use crate::stats::Probe;
+use crate::stats::{Off, Probe};
 use crate::traverse::traverse;
 use crate::wide::{self, BoxRay, Visit};
-use crate::{BuildError, BuildOptions, Geometry, Guards, HitId, Layout};
+use crate::{BuildError, BuildOptions, Geometry, Guards, Hit, HitId, Layout};
 
 /// The parts of one mesh, ready to be traced.
 #[derive(Clone, Debug)]
@@ -347,9 +347,20 @@ impl Model {
         }
     }
 
+    /// The number of what lies at a place of the leaves, among all primitives in the caller's order: so ids are ordered.
+    pub(crate) fn number(&self, place: usize) -> Option<u32> {
+        self.numbers.get(place).copied()
+    }
+
+    /// Whether there is anything at a place of the leaves.
+    #[inline(always)]
+    pub(crate) fn has(&self, place: usize) -> bool {
+        self.numbers.get(place).is_some_and(|&n| n != u32::MAX)
+    }
+
     /// What lies at a place of the leaves; `None` where nothing does.
     #[inline(always)]
-    fn id(&self, place: usize) -> Option<PrimitiveId> {
+    pub(crate) fn id(&self, place: usize) -> Option<PrimitiveId> {
         let number = *self.numbers.get(place)?;
         if number == u32::MAX {
             return None;
@@ -448,6 +459,26 @@ impl Model {
         } else {
             wide::traverse::<L, _, P, false>(tree, &boxes, &filter, probe, &mut visitor)
         }
+    }
+
+    /// The hit of a ray with the triangle at a place of the wide tree, which has passed the filter: with the normal as it
+    /// is in the object's space, and as if of the first instance.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn hit_of_one<K: Kernel>(
+        &self,
+        ray: &Ray<f64>,
+        transform: &Transform,
+        place: usize,
+        triangle: &[Vec3; 3],
+        known: [f32; 3],
+    ) -> Option<Hit> {
+        let local = LocalRay::enter(ray, transform, &self.extent)?;
+        let mut first = Collect::new(ray, None, |_| true, Closest { order: |_, _| false, best: None });
+        let mut offer = OfferTriangle::<false, K>::new(self, &local, 0, &first);
+        // It never breaks.
+        let _ = offer.offer(place, triangle, Some(known), &mut first, &mut Off);
+        first.take.best
     }
 
     /// A function of its own, so that its loop has the registers.

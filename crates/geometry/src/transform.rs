@@ -97,6 +97,13 @@ impl Transform {
         self.inverse
     }
 
+    /// What normals are multiplied with, before they are made unit: the inverse transpose of the linear part, up to a
+    /// positive factor.
+    #[must_use]
+    pub fn normal_linear(&self) -> DMat3 {
+        self.normal
+    }
+
     /// Where the object's origin lies in the world.
     #[must_use]
     pub fn translation(&self) -> DVec3 {

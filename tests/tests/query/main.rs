@@ -7,6 +7,7 @@ mod guards;
 mod hard;
 mod invariance;
 mod leaks;
+mod packets;
 mod rays;
 mod shapes;
 mod spawn;

@@ -10,10 +10,14 @@ use super::{Any, Closest, Collect, Collector};
 use crate::kernel::{Double, Exact, Fast, Guarded, Kernel, Robust};
 use crate::layout::wide8::Wide8;
 use crate::model::Model;
+use crate::packet::{self, Packet, Tier};
 use crate::scene::{Inner, is_interval};
 use crate::simd::{self, Available, Lanes, Work};
 use crate::stats::Off;
 use crate::{Guards, Hit, Scene};
+
+/// The guards that the tier `Robust` has in queries.
+const NEEDED: Guards = Guards::ALL.difference(Guards::OFFSET);
 
 impl Scene {
     /// The nearest hit in the ray's closed interval; `None` also for an invalid ray.
@@ -23,8 +27,22 @@ impl Scene {
     }
 
     /// [`Scene::closest_hit`] for each ray, into the slot of the same index. The shorter slice decides how many.
+    ///
+    /// Rays that go the same way, as those of neighbouring pixels in the order of small squares, are traced together where
+    /// they follow each other; the answers are the same.
     pub fn closest_hits(&self, rays: &[Ray<f64>], hits: &mut [Option<Hit>]) {
-        self.inner().by_kernel(ClosestHits { scene: self, rays, hits });
+        let n = rays.len().min(hits.len());
+        let (rays, hits) = (&rays[..n], &mut hits[..n]);
+        let (precision, guards) = (self.options().precision, self.options().guards);
+        match self.inner().only() {
+            Some((level, only)) if precision == Precision::Fast => {
+                simd::run(level, ClosestInPackets::<Fast> { only, scene: self, rays, hits, kernel: PhantomData });
+            }
+            Some((level, only)) if precision == Precision::Robust && guards.contains(NEEDED) => {
+                simd::run(level, ClosestInPackets::<Robust> { only, scene: self, rays, hits, kernel: PhantomData });
+            }
+            _ => self.inner().by_kernel(ClosestHits { scene: self, rays, hits }),
+        }
     }
 
     /// Whether anything lies in the ray's closed interval: true exactly when [`Scene::closest_hit`] finds something.
@@ -35,7 +53,18 @@ impl Scene {
 
     /// [`Scene::any_hit`] for each ray, into the slot of the same index. The shorter slice decides how many.
     pub fn any_hits(&self, rays: &[Ray<f64>], hits: &mut [bool]) {
-        self.inner().by_kernel(AnyHits { scene: self, rays, hits });
+        let n = rays.len().min(hits.len());
+        let (rays, hits) = (&rays[..n], &mut hits[..n]);
+        let (precision, guards) = (self.options().precision, self.options().guards);
+        match self.inner().only() {
+            Some((level, only)) if precision == Precision::Fast => {
+                simd::run(level, AnyInPackets::<Fast> { only, rays, hits, kernel: PhantomData });
+            }
+            Some((level, only)) if precision == Precision::Robust && guards.contains(NEEDED) => {
+                simd::run(level, AnyInPackets::<Robust> { only, rays, hits, kernel: PhantomData });
+            }
+            _ => self.inner().by_kernel(AnyHits { scene: self, rays, hits }),
+        }
     }
 }
 
@@ -230,6 +259,71 @@ impl<K: Kernel> Work for ClosestHitsOf<'_, K> {
     }
 }
 
+/// [`ClosestHits`] in the only instance, in packets where rays suit each other.
+struct ClosestInPackets<'a, T> {
+    only: Only<'a>,
+    scene: &'a Scene,
+    rays: &'a [Ray<f64>],
+    hits: &'a mut [Option<Hit>],
+    kernel: PhantomData<T>,
+}
+
+impl<T: Tier> Work for ClosestInPackets<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let Self { only, scene, mut rays, mut hits, .. } = self;
+        let mut packet = Packet::new(only.model, only.tree, only.transform);
+        while !rays.is_empty() {
+            let (now, later) = rays.split_at(rays.len().min(packet::RAYS));
+            let (now_hits, later_hits) = hits.split_at_mut(now.len());
+            (rays, hits) = (later, later_hits);
+            if let Some(together) = now.first_chunk()
+                && packet.suits(together)
+            {
+                packet.closest::<L, T>(together, now_hits);
+                continue;
+            }
+            for (ray, hit) in now.iter().zip(now_hits) {
+                *hit = only.closest::<L, T>(scene, ray);
+            }
+        }
+    }
+}
+
+/// [`AnyHits`] in the only instance, likewise.
+struct AnyInPackets<'a, T> {
+    only: Only<'a>,
+    rays: &'a [Ray<f64>],
+    hits: &'a mut [bool],
+    kernel: PhantomData<T>,
+}
+
+impl<T: Tier> Work for AnyInPackets<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let Self { only, mut rays, mut hits, .. } = self;
+        let mut packet = Packet::new(only.model, only.tree, only.transform);
+        while !rays.is_empty() {
+            let (now, later) = rays.split_at(rays.len().min(packet::RAYS));
+            let (now_hits, later_hits) = hits.split_at_mut(now.len());
+            (rays, hits) = (later, later_hits);
+            if let Some(together) = now.first_chunk()
+                && packet.suits(together)
+            {
+                packet.any::<L, T>(together, now_hits);
+                continue;
+            }
+            for (ray, hit) in now.iter().zip(now_hits) {
+                *hit = only.any::<L, T>(ray);
+            }
+        }
+    }
+}
+
 /// [`AnyHits`] in the only instance.
 struct AnyHitsOf<'a, K> {
     only: Only<'a>,
@@ -255,9 +349,7 @@ impl Inner {
     pub(crate) fn by_kernel<W: ForKernel>(&self, work: W) -> W::Output {
         match self.options.precision {
             Precision::Fast => work.run::<Fast>(),
-            Precision::Robust if self.options.guards.contains(Guards::ALL.difference(Guards::OFFSET)) => {
-                work.run::<Robust>()
-            }
+            Precision::Robust if self.options.guards.contains(NEEDED) => work.run::<Robust>(),
             Precision::Robust => work.run::<Guarded>(),
             Precision::Double => work.run::<Double>(),
             Precision::Exact => work.run::<Exact>(),

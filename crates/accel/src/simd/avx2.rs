@@ -10,7 +10,7 @@ use super::{Lanes, Row, Work};
 
 /// Eight `f32`.
 #[derive(Clone, Copy)]
-struct Avx2(__m256);
+pub(super) struct Avx2(pub(super) __m256);
 
 /// Does the work with AVX2, FMA and BMI2.
 ///

@@ -6,7 +6,7 @@ use super::{Lanes, Row, Work};
 
 /// Eight `f32`.
 #[derive(Clone, Copy)]
-struct Avx512(__m256);
+pub(super) struct Avx512(pub(super) __m256);
 
 /// Does the work with AVX-512 F and VL, and what comes with AVX2.
 ///

@@ -8,11 +8,15 @@
 mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
+mod eight;
+#[cfg(target_arch = "x86_64")]
+mod eight_x86;
 mod portable;
 mod stack;
 #[cfg(target_arch = "x86_64")]
 mod ymm;
 
+pub(crate) use eight::{Eight, Packed};
 pub(crate) use portable::Portable;
 pub(crate) use stack::Stack;
 
@@ -88,7 +92,7 @@ impl core::str::FromStr for Level {
 }
 
 /// Eight `f32`. Comparisons answer with one bit for each lane, false for NaN.
-pub(crate) trait Lanes: Copy {
+pub(crate) trait Lanes: Packed {
     fn splat(x: f32) -> Self;
     fn load(x: &[f32; 8]) -> Self;
     /// One of the rows.

@@ -5,7 +5,7 @@ use super::{Lanes, Row};
 /// An array: what the compiler makes of it depends on the target.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(32))]
-pub(crate) struct Portable([f32; 8]);
+pub(crate) struct Portable(pub(super) [f32; 8]);
 
 impl Portable {
     #[inline(always)]

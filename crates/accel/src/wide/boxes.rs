@@ -7,7 +7,7 @@ use crate::simd::{Lanes, Row};
 
 /// Reciprocals are kept finite, so that no product is NaN: a direction component smaller than this bends the ray by
 /// less than the slack in the boxes' padding.
-const SMALLEST: f32 = 1e-18;
+pub(crate) const SMALLEST: f32 = 1e-18;
 
 /// A ray for the test of eight boxes: `plane * inverse - origin * inverse`, which is one instruction.
 ///

@@ -7,9 +7,8 @@ use core::ops::ControlFlow;
 
 use glam::Vec3;
 
-pub(crate) use boxes::Boxes;
-use triangles::Leaf;
-pub(crate) use triangles::{Either, Filter, Margin, Plain, Sheared};
+pub(crate) use boxes::{Boxes, SMALLEST};
+pub(crate) use triangles::{Either, Filter, Leaf, Margin, Plain, Sheared};
 
 use crate::layout::wide8::{Reference, Wide8};
 use crate::simd::{Lanes, Stack};

@@ -92,6 +92,14 @@ impl<L: Lanes> Sheared<L> {
         }
     }
 
+    /// The same for origin and slopes that are known already, in the order of the axes.
+    #[inline(always)]
+    pub(crate) fn known(origin: [f32; 3], axes: [usize; 3], slopes: [f32; 2], depth: f32, slack: f32) -> Self {
+        let [x, y, z] = origin;
+        let shear = [L::splat(slopes[0]), L::splat(slopes[1])];
+        Self { origin: [L::splat(x), L::splat(y), L::splat(z)], axes, shear, off: 0.0, depth, slack }
+    }
+
     #[inline(always)]
     fn corner(&self, leaf: &Leaf<'_>, vertex: usize) -> [L; 3] {
         let x = leaf.load::<L>(vertex, self.axes[0]).sub(self.origin[0]);

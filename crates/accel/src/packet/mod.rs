@@ -1,0 +1,148 @@
+//! Packets: rays that go the same way, through the tree together.
+//!
+//! A packet is two groups of eight rays. Setting up, triangles and finishing are done for eight rays at once, nodes are
+//! met by all together. The answers are those of single rays, bit by bit (of `Fast` but for rays at the very edges of
+//! boxes, which a packet may find where a single ray does not).
+
+mod frustum;
+mod group;
+mod tier;
+mod trace;
+mod vectors;
+
+use firsthit_geometry::{Ray, transform::Transform};
+use glam::DVec3;
+
+pub(crate) use tier::Tier;
+
+use crate::layout::wide8::{Reference, Wide8};
+use crate::model::Model;
+use crate::simd::{Eight, Lanes};
+use crate::{Hit, HitId};
+use group::{Entry, Group, transformed};
+use tier::Way;
+use trace::{Among, trace};
+
+/// Groups of a packet.
+const GROUPS: usize = 2;
+
+/// Rays of a packet.
+pub(crate) const RAYS: usize = 8 * GROUPS;
+
+/// Room for a packet, to be used again for the next one.
+pub(crate) struct Packet<'a> {
+    model: &'a Model,
+    tree: &'a Wide8,
+    transform: &'a Transform,
+    groups: [Group; GROUPS],
+}
+
+impl<'a> Packet<'a> {
+    /// For the only instance of a scene.
+    #[inline(always)]
+    pub(crate) fn new(model: &'a Model, tree: &'a Wide8, transform: &'a Transform) -> Self {
+        Self { model, tree, transform, groups: [Group::default(); GROUPS] }
+    }
+
+    /// Whether rays may well go together: seen from a few of them, which is all that rays pay that do not.
+    #[inline(always)]
+    pub(crate) fn suits(&self, rays: &[Ray<f64>; RAYS]) -> bool {
+        let Reference(_) = self.tree.root;
+        if self.tree.root.is_leaf() {
+            return false;
+        }
+        let (first, middle, last) = (&rays[0].direction, &rays[RAYS / 2 + 1].direction, &rays[RAYS - 1].direction);
+        narrow(first, last) && narrow(first, middle)
+    }
+
+    /// The nearest hit of each ray.
+    #[inline(always)]
+    pub(crate) fn closest<L: Lanes, T: Tier>(&mut self, rays: &[Ray<f64>; RAYS], hits: &mut [Option<Hit>]) {
+        self.trace::<L, T, false>(rays);
+        for (group, hits) in self.groups.iter_mut().zip(hits.as_chunks_mut::<8>().0) {
+            group.finish::<L>(self.model, self.transform, hits);
+        }
+    }
+
+    /// Whether each ray hits anything.
+    #[inline(always)]
+    pub(crate) fn any<L: Lanes, T: Tier>(&mut self, rays: &[Ray<f64>; RAYS], hits: &mut [bool]) {
+        self.trace::<L, T, true>(rays);
+        for (group, hits) in self.groups.iter().zip(hits.as_chunks_mut::<8>().0) {
+            for (lane, hit) in hits.iter_mut().enumerate() {
+                *hit = group.hit >> lane & 1 == 1;
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn trace<L: Lanes, T: Tier, const ANY: bool>(&mut self, rays: &[Ray<f64>; RAYS]) {
+        let Self { model, tree, transform, groups } = self;
+        let rays = rays.as_chunks::<8>().0;
+        let entry = Entry { transform, extent: model.extent(), padded: T::PADDED };
+        let mut left = [0; GROUPS];
+        for (k, group) in groups.iter_mut().enumerate() {
+            group.enter::<L>(&rays[k], &entry);
+            left[k] = group.valid;
+        }
+        let among = Among { model, tree, transform, rays };
+        // Once for each way that some of them go; nearly always there is one.
+        while let Some(k) = left.iter().position(|&m| m != 0) {
+            let lane = left[k].trailing_zeros();
+            let leader = &groups[k];
+            let axis = leader.axis(lane);
+            let negative = [
+                leader.negative[0] >> lane & 1 == 1,
+                leader.negative[1] >> lane & 1 == 1,
+                leader.negative[2] >> lane & 1 == 1,
+            ];
+            let way = Way { negative, axes: [[1, 2, 0], [2, 0, 1], [0, 1, 2]][axis] };
+            for k in 0..GROUPS {
+                let lanes = left[k] & groups[k].alike(negative, axis);
+                left[k] &= !lanes;
+                groups[k].wake::<L>(lanes, way.axes);
+            }
+            trace::<L, T, ANY>(&among, groups, &way);
+        }
+    }
+}
+
+/// Whether two directions are within about 8 degrees of each other.
+#[inline(always)]
+fn narrow(a: &DVec3, b: &DVec3) -> bool {
+    let along = a.dot(*b);
+    along > 0.0 && along * along > 0.98 * (a.length_squared() * b.length_squared())
+}
+
+impl Group {
+    /// Gives out the hits as users get them: with their ids and with the normal of the world.
+    #[inline(always)]
+    fn finish<L: Lanes>(&mut self, model: &Model, transform: &Transform, hits: &mut [Option<Hit>; 8]) {
+        let of = L::Eight::splat;
+        let [x, y, z] = &self.normal;
+        let normal = [L::Eight::load(x), L::Eight::load(y), L::Eight::load(z)];
+        let linear = transform.normal_linear();
+        let normal = if transform.is_uniform() {
+            vectors::scaled(normal, of(linear.x_axis.x))
+        } else {
+            transformed(&linear, normal)
+        };
+        // As `normalize_or_zero`.
+        let inverse = of(1.0).div(vectors::dot(normal, normal).sqrt());
+        let unit = vectors::scaled(normal, inverse);
+        let usable = of(0.0).lt(inverse) & inverse.le(of(f64::MAX));
+        for axis in 0..3 {
+            unit[axis].select(usable, of(0.0)).store(&mut self.normal[axis]);
+        }
+        for (lane, hit) in hits.iter_mut().enumerate() {
+            *hit = None;
+            if self.hit >> lane & 1 == 1
+                && let Some(id) = model.id(self.place[lane] as usize)
+            {
+                let normal = DVec3::new(self.normal[0][lane], self.normal[1][lane], self.normal[2][lane]);
+                let id = HitId { instance: 0, geometry: id.geometry, primitive: id.primitive };
+                *hit = Some(Hit { id, t: self.t_max[lane], u: self.u[lane], v: self.v[lane], normal });
+            }
+        }
+    }
+}
