@@ -62,7 +62,7 @@ fn same_at_all(mesh: &Mesh, transform: DAffine3, rays: &[Ray<f64>], name: &str) 
 fn cameras_see_what_single_rays_see() {
     let scans = ["spot/spot.obj", "stanford-bunny/stanford-bunny.obj", "sibenik/sibenik.obj", "teapot/teapot.obj"];
     let shared = firsthit_tests::shared();
-    let scans = scans.iter().filter_map(|s| Some((*s, read_obj(&shared.as_ref()?.join("assets").join(s)).ok()?)));
+    let scans = scans.iter().filter_map(|s| Some((*s, read_obj(&shared.as_ref()?.join("assets").join(s))?)));
     let made = [("icosphere", icosphere(5)), ("grid", grid_cube(12))];
     for (name, mesh) in made.into_iter().chain(scans) {
         let (low, high) =

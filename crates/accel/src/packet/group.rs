@@ -14,7 +14,7 @@ pub(super) type Doubles = [f64; 8];
 pub(super) type Singles = [f32; 8];
 
 /// Eight rays in an object's normalised space. What is the same as in a [`LocalRay`](crate::local::LocalRay) has the same
-/// bits (there is a test): each lane does the operations of [`LocalRay::enter`](crate::local::LocalRay::enter) in their
+/// bits: each lane does the operations of [`LocalRay::enter`](crate::local::LocalRay::enter) in their
 /// order.
 ///
 /// All rows lie in memory: a packet has more of them than there are registers.
