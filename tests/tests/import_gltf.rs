@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use firsthit_import::scene::{
-    AlphaMode, Filter, LightKind, MaterialModel, PbrMaterial, Projection, SpotRamp, SurfaceDesc, TriangleMesh, Wrap,
+    AlphaMode, Channel, Filter, LightKind, MaterialModel, PbrMaterial, Projection, SpotRamp, SurfaceDesc, TriangleMesh,
+    Wrap,
 };
 use firsthit_import::{ErrorKind, ImportError, Imported, Limits, Options, SceneDesc, Support, gltf};
 use glam::{DVec3, Vec2, Vec3, Vec4};
@@ -240,6 +241,61 @@ fn pbr(scene: &SceneDesc, material: usize) -> &PbrMaterial {
         MaterialModel::Pbr(pbr) => pbr,
         _ => panic!("glTF has one model of materials"),
     }
+}
+
+#[test]
+fn khronos_layered_materials_are_read() {
+    let Some(path) = khronos("ClearCoatTest/glTF-Binary/ClearCoatTest.glb") else { return };
+    let scene = read(&path).unwrap().scene;
+    assert!(pbr(&scene, 0).clearcoat.is_none());
+    let coat = pbr(&scene, 7).clearcoat.as_ref().unwrap();
+    assert_eq!((coat.factor, coat.roughness), (1.0, 1.0));
+    assert_eq!(coat.roughness_texture.as_ref().unwrap().channel, Channel::Green);
+    let coat = pbr(&scene, 13).clearcoat.as_ref().unwrap();
+    assert!(coat.normal_texture.is_some() && pbr(&scene, 13).normal_texture.is_none());
+    assert!(
+        scene.instances.iter().any(|i| {
+            let geometry = &scene.meshes[i.mesh].geometries[0];
+            geometry.material == Some(13) && !triangles(&scene, i.mesh, 0).tangents.is_empty()
+        }),
+        "the coat's normal map needs tangents"
+    );
+
+    let Some(path) = khronos("IridescenceSuzanne/glTF-Binary/IridescenceSuzanne.glb") else { return };
+    let scene = read(&path).unwrap().scene;
+    let film = pbr(&scene, 2).iridescence.as_ref().unwrap();
+    assert_eq!((film.factor, film.ior, film.thickness_min, film.thickness_max), (1.0, 1.8, 200.0, 600.0));
+    assert_eq!(film.thickness_texture.as_ref().unwrap().channel, Channel::Green);
+    assert_eq!(pbr(&scene, 0).iridescence.as_ref().unwrap().thickness_min, 100.0, "the format's default");
+
+    let Some(path) = khronos("AnisotropyRotationTest/glTF-Binary/AnisotropyRotationTest.glb") else { return };
+    let scene = read(&path).unwrap().scene;
+    let brushed = pbr(&scene, 3).anisotropy.as_ref().unwrap();
+    assert_eq!((brushed.strength, brushed.rotation), (0.5, 0.349_065_86));
+    assert!(brushed.texture.is_some());
+}
+
+#[test]
+fn a_variant_is_chosen_by_name_or_number() {
+    let Some(path) = khronos("GlamVelvetSofa/glTF-Binary/GlamVelvetSofa.glb") else { return };
+    let fabric = |variant: Option<&str>| {
+        let options = Options { variant: variant.map(str::to_owned), ..Options::default() };
+        let Imported { scene, report } = gltf::read(&path, &options)?;
+        assert_eq!(report.variants, ["Champagne", "Navy", "Gray", "Black", "Pale Pink"]);
+        let used = scene.instances.iter().flat_map(|i| &scene.meshes[i.mesh].geometries).filter_map(|g| g.material);
+        let mut names: Vec<_> = used.map(|m| scene.materials[m].name.clone()).collect();
+        names.retain(|name| name.contains("fabric"));
+        Ok::<_, ImportError>(names)
+    };
+    assert_eq!(fabric(None).unwrap(), ["GlamVelvetSofa_fabric_navy"]);
+    assert_eq!(fabric(Some("Pale Pink")).unwrap(), ["GlamVelvetSofa_fabric_palepink"]);
+    assert_eq!(fabric(Some("0")).unwrap(), ["GlamVelvetSofa_fabric_champagne"]);
+    let error = fabric(Some("Red")).unwrap_err().to_string();
+    assert!(error.contains("'Red'") && error.contains("4 'Pale Pink'"), "{error}");
+
+    let Some(path) = khronos("Box/glTF-Binary/Box.glb") else { return };
+    let options = Options { variant: Some("x".into()), ..Options::default() };
+    assert!(gltf::read(&path, &options).unwrap_err().to_string().contains("the file has none"));
 }
 
 /// All corners of triangles, in the world, in the order of the file.

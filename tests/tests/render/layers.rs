@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 
 use firsthit_import::SceneDesc;
 use firsthit_import::scene::{
-    Anisotropy, Clearcoat, DiffuseTransmission, EnvironmentDesc, Iridescence, LightKind, MaterialModel, PbrMaterial,
-    Sheen,
+    Anisotropy, Clearcoat, DiffuseTransmission, EnvironmentDesc, Filter, ImageDesc, Iridescence, LightKind,
+    MaterialModel, PbrMaterial, Pixels, Sheen, TextureRef,
 };
 use firsthit_render::{EffectOverrides, EffectSet, StageOptions};
 use glam::{DVec3, Vec3};
@@ -79,6 +79,20 @@ fn rough_white_metal_keeps_all_light_unless_compensation_is_off() {
             assert_near(with(true), 1.0, 5e-3);
             let lost = 1.0 - with(false);
             assert!(lost > if roughness > 0.5 { 0.05 } else { 0.0 } && lost < 0.7, "{roughness} {cos}: {lost}");
+        }
+    }
+}
+
+/// Rough glass and rough sheets, from outside and from inside.
+#[test]
+fn rough_glass_keeps_all_light() {
+    for (thickness, roughness) in [(1.0, 0.4), (1.0, 0.8), (0.0, 0.6)] {
+        let glass = matt(1.0, |m| {
+            (m.transmission, m.thickness, m.roughness, m.specular) = (1.0, thickness, roughness, 1.0);
+        });
+        let scene = plain_under_sky(glass);
+        for cos in [0.9, 0.4, -0.9, -0.4] {
+            assert_near(seen(&scene, cos).x, 1.0, 0.012);
         }
     }
 }
@@ -165,6 +179,35 @@ fn brushed_metal_spreads_light_along_its_direction() {
         let narrow = DVec3::new(wide.z, 0.0, wide.x);
         let (along, across) = (at(wide * 1.2), at(narrow * 1.2));
         assert!(along > 4.0 * across, "rotation {rotation}: {along} along, {across} across");
+    }
+}
+
+/// However steep a normal map, it makes no light, and no black where mirror directions leave the surface.
+#[test]
+fn normal_maps_make_no_light() {
+    // Steeper and steeper, turning round.
+    let texel = |i: u32| {
+        let (angle, tilt) = (f64::from(i) * 2.4, f64::from(i % 16) / 16.0);
+        let encode = |x: f64| ((x * 0.5 + 0.5) * 255.0).round() as u8;
+        let z = (1.0 - tilt * tilt).sqrt();
+        [encode(tilt * angle.cos()), encode(tilt * angle.sin()), encode(z), 255]
+    };
+    let pixels = Pixels::Rgba8((0..64).map(texel).collect());
+    for (metallic, roughness) in [(0.0, 1.0), (1.0, 0.1), (1.0, 0.5)] {
+        let material = matt(1.0, |m| {
+            (m.metallic, m.roughness) = (metallic, roughness);
+            let texture = TextureRef { filter: Filter::Nearest, ..TextureRef::new(0) };
+            m.normal_texture = Some(texture);
+        });
+        let mut scene = plain_under_sky(material);
+        scene.images.push(ImageDesc { name: "normals".into(), width: 8, height: 8, pixels: pixels.clone() });
+        for i in 0..64 {
+            let at = DVec3::new(f64::from(i % 8) - 3.5, 0.0, f64::from(i / 8) - 3.5) * (18.0 / 8.0);
+            for eye in [DVec3::new(0.3, 3.0, 0.2), DVec3::new(5.0, 1.0, 0.0)] {
+                let found = Probe::new(&scene).from(at + eye).spp(256).look(at).x;
+                assert!(found < 1.05 && found > 0.3, "metallic {metallic}, texel {i}: {found}");
+            }
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::lobes::{Lambert, Lobe};
+use super::lobes::Lobe;
 use crate::warp;
 
 /// The most lobes that a surface has: diffuse, reflection, transmission, diffuse transmission, sheen, coat.
@@ -23,8 +23,7 @@ impl Bsdf {
     /// Black.
     pub(crate) fn new(normal: Vec3) -> Self {
         let (x, y) = warp::frame(normal);
-        let none = Lobe::Lambert(Lambert { albedo: Vec3::ZERO, coat: None });
-        Self { x, y, normal, lobes: [none; MAX_LOBES], count: 0 }
+        Self { x, y, normal, lobes: [Lobe::Nothing; MAX_LOBES], count: 0 }
     }
 
     /// Black, with an x axis along the surface that lies as near to `tangent` as the normal lets it.
@@ -36,6 +35,7 @@ impl Bsdf {
     }
 
     /// Adds a lobe: at most [`MAX_LOBES`].
+    #[inline]
     pub(crate) fn with(mut self, lobe: Lobe) -> Self {
         self.lobes[self.count] = lobe;
         self.count += 1;

@@ -6,17 +6,20 @@ use std::sync::LazyLock;
 
 use glam::Vec3;
 
-use super::lobes::{Lobe, Sheen};
+use super::fresnel::{Fresnel, normal_incidence};
+use super::lobes::{GgxReflection, GgxTransmission, Lobe, Sheen};
 use super::microfacet::{Masking, g1, g2, sample_visible};
 
-/// Cells along each side.
-const SIZE: usize = 32;
+/// Points along each side of the tables that all materials share.
+const FINE: usize = 32;
+/// Of those that a material has for itself.
+const COARSE: usize = 16;
 
 /// A function of the cosine to the viewer and the roughness, both in 0..1, interpolated between its values on a grid.
 #[derive(Debug)]
-struct Table([[f32; SIZE]; SIZE]);
+struct Table<const SIZE: usize>([[f32; SIZE]; SIZE]);
 
-impl Table {
+impl<const SIZE: usize> Table<SIZE> {
     /// The cosine at a row: rows are close together at grazing angles.
     fn cos(row: usize) -> f32 {
         let x = row as f32 / (SIZE - 1) as f32;
@@ -82,17 +85,67 @@ fn integrate_sheen(cos: f32, roughness: f32) -> f32 {
     sum * 2.0 * PI / (N * M) as f32
 }
 
-static GGX: LazyLock<Table> = LazyLock::new(|| {
+/// Of a rough boundary between media that absorbs nothing: what is reflected and goes through by one bounce.
+fn integrate_boundary<const N: u32, const M: u32>(cos: f32, alpha: f32, eta: f32, f0: f32) -> f32 {
+    let fresnel = Fresnel::Schlick { f0: Vec3::splat(f0), f90: 1.0, eta };
+    let reflection = GgxReflection { alpha, fresnel, masking: Masking::Correlated, scale: Vec3::ONE };
+    let transmission = GgxTransmission { alpha, eta, fresnel, tint: Vec3::ONE, scale: 1.0 };
+    let lobes = [Lobe::GgxReflection(reflection), Lobe::GgxTransmission(transmission)];
+    let wo = Vec3::new((1.0 - cos * cos).max(0.0).sqrt(), 0.0, cos);
+    let mut sum = 0.0;
+    for i in 0..N * M {
+        let (phi, t) = (((i % M) as f32 + 0.5) / (2 * M) as f32, ((i / M) as f32 + 0.5) / N as f32);
+        let u = [phi, 1.0 - (1.0 - t) * (1.0 - t)];
+        for lobe in &lobes {
+            sum += 2.0 * (1.0 - t) * lobe.sample(wo, u).map_or(0.0, |s| s.weight.x);
+        }
+    }
+    sum / (N * M) as f32
+}
+
+/// What a rough boundary of a solid keeps of the light by one bounce, from outside and from inside.
+#[derive(Debug)]
+pub(super) struct Boundary {
+    outside: Table<COARSE>,
+    inside: Table<COARSE>,
+}
+
+impl Boundary {
+    /// For an index of refraction above 1.
+    pub(super) fn new(ior: f32) -> Self {
+        let f0 = normal_incidence(ior);
+        let table = |eta| {
+            Table::new(|cos, roughness| {
+                integrate_boundary::<32, 16>(cos, (roughness * roughness).max(super::LEAST_ALPHA), eta, f0)
+            })
+        };
+        Self { outside: table(ior), inside: table(1.0 / ior) }
+    }
+
+    /// What both lobes have to be multiplied with so that nothing is lost, as [`compensation`] for mirrors.
+    pub(super) fn compensation(&self, cos: f32, roughness: f32, outside: bool) -> f32 {
+        let table = if outside { &self.outside } else { &self.inside };
+        1.0 / table.get(cos, roughness).max(0.1)
+    }
+}
+
+static GGX: LazyLock<Table<FINE>> = LazyLock::new(|| {
     Table::new(|cos, roughness| integrate_ggx::<32, 8>(cos, (roughness * roughness).max(super::LEAST_ALPHA)))
 });
 
-static SHEEN: LazyLock<Table> = LazyLock::new(|| Table::new(|cos, roughness| integrate_sheen(cos, roughness).min(1.0)));
+static SHEEN: LazyLock<Table<FINE>> =
+    LazyLock::new(|| Table::new(|cos, roughness| integrate_sheen(cos, roughness).min(1.0)));
 
 /// What a GGX reflection has to be multiplied with so that light which bounces between facets is not lost: Turquin,
 /// "Practical multiple scattering compensation for microfacet models" (2019). `f0`: reflectance along the normal.
 pub(super) fn compensation(cos: f32, roughness: f32, f0: Vec3) -> Vec3 {
     let reflected = GGX.get(cos, roughness);
     Vec3::ONE + f0 * (1.0 / reflected - 1.0)
+}
+
+/// As [`compensation`], of thin sheets: what is not reflected goes through by the same facets.
+pub(super) fn thin_compensation(cos: f32, roughness: f32) -> f32 {
+    1.0 / GGX.get(cos, roughness)
 }
 
 /// What white sheen of this roughness reflects.

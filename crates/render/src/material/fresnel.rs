@@ -38,7 +38,7 @@ pub(crate) enum Fresnel {
         /// Reflectance along the normal.
         f0: Vec3,
         /// Reflectance along the surface.
-        f90: Vec3,
+        f90: f32,
         /// Index of the other side over that of this side where the surface is the boundary of a solid, else 1. Only
         /// matters below 1: then the refracted angle counts, and there is total internal reflection.
         eta: f32,
@@ -48,7 +48,10 @@ pub(crate) enum Fresnel {
         /// Reflectance along the normal without the film.
         f0: Vec3,
         /// Reflectance along the surface without the film.
-        f90: Vec3,
+        f90: f32,
+        /// As for `Schlick`: a stack that absorbs nothing reflects as much from either side, at angles that belong
+        /// together.
+        eta: f32,
         /// The film.
         film: Film,
     },
@@ -69,15 +72,17 @@ impl Fresnel {
                 match cos {
                     Some(cos) => {
                         let x = (1.0 - cos).clamp(0.0, 1.0);
-                        f0 + (f90 - f0) * (x * x * x * x * x)
+                        f0 + (Vec3::splat(f90) - f0) * (x * x * x * x * x)
                     }
                     None => Vec3::ONE,
                 }
             }
-            Self::Film { f0, f90, film } => {
+            Self::Film { f0, f90, eta, film } => {
+                let cos = if eta < 1.0 { refracted_cos(cos, eta) } else { Some(cos) };
+                let Some(cos) = cos else { return Vec3::ONE };
                 let x = (1.0 - cos).clamp(0.0, 1.0);
-                let bare = f0 + (f90 - f0) * (x * x * x * x * x);
-                bare.lerp(film.reflectance(f0, cos) * f90.max_element(), film.factor)
+                let bare = f0 + (Vec3::splat(f90) - f0) * (x * x * x * x * x);
+                bare.lerp(film.reflectance(f0, cos) * f90, film.factor)
             }
             Self::Dielectric { eta } => Vec3::splat(dielectric(cos, eta)),
         }
@@ -87,9 +92,7 @@ impl Fresnel {
     /// (KHR_materials_specular), by the largest channel, so that the base does not take on the opposite colour.
     pub(crate) fn over_diffuse(self, colored: bool) -> Self {
         match self {
-            Self::Schlick { f0, f90, eta } if colored => {
-                Self::Schlick { f0: Vec3::splat(f0.max_element()), f90: Vec3::splat(f90.max_element()), eta }
-            }
+            Self::Schlick { f0, f90, eta } if colored => Self::Schlick { f0: Vec3::splat(f0.max_element()), f90, eta },
             _ => self,
         }
     }
@@ -155,7 +158,7 @@ mod tests {
         let critical = (1.0f64 / 1.5).asin();
         assert!(dielectric((critical - 1e-3).cos() as f32, 1.0 / 1.5) < 1.0);
         assert_eq!(dielectric((critical + 1e-3).cos() as f32, 1.0 / 1.5), 1.0);
-        let inside = Fresnel::Schlick { f0: Vec3::splat(0.04), f90: Vec3::ONE, eta: 1.0 / 1.5 };
+        let inside = Fresnel::Schlick { f0: Vec3::splat(0.04), f90: 1.0, eta: 1.0 / 1.5 };
         assert_eq!(inside.reflectance((critical + 1e-3).cos() as f32), Vec3::ONE);
         assert!((inside.reflectance(1.0).x - 0.04).abs() < 1e-6);
     }

@@ -178,7 +178,7 @@ impl Layers {
 
     /// The base's law of reflectance under the film.
     pub(super) fn filmed<const TEXTURES: bool>(&self, surface: &Surface<'_>, base: Fresnel) -> Fresnel {
-        let (Some(film), Fresnel::Schlick { f0, f90, .. }) = (&self.film, base) else { return base };
+        let (Some(film), Fresnel::Schlick { f0, f90, eta }) = (&self.film, base) else { return base };
         let factor = (film.factor * scalar::<TEXTURES>(film.texture.as_ref(), surface)).clamp(0.0, 1.0);
         if factor == 0.0 {
             return base;
@@ -188,7 +188,7 @@ impl Layers {
         // Below a coat, that is what the film lies in.
         let coated = self.coat.as_ref().map_or(0.0, |c| c.factor);
         let outside = 1.0 + (COAT_IOR - 1.0) * coated;
-        Fresnel::Film { f0, f90, film: Film { factor, outside, ior: film.ior, thickness } }
+        Fresnel::Film { f0, f90, eta, film: Film { factor, outside, ior: film.ior, thickness } }
     }
 
     /// The direction in which the surface is brushed.

@@ -9,16 +9,19 @@
 //! From the top: clear coat, sheen, then the base, of which a film, if there is one, is the reflectance. A layer leaves
 //! to those below what it does not reflect itself towards the viewer.
 
+use std::sync::Arc;
+
 use firsthit_import::scene::{AlphaMode, PbrMaterial};
 use glam::{Vec3, Vec4Swizzles};
 
+use super::energy::{self, Boundary};
 use super::fresnel::{Fresnel, normal_incidence};
 use super::layers::{self, Layers};
 use super::lobes::{
     AnisotropicGgx, GgxReflection, GgxTransmission, Lambert, Lobe, SpecularTransmission, ThinTransmission,
 };
 use super::microfacet::Masking;
-use super::{Bsdf, Conventions, LEAST_ALPHA, Shading, Textures, energy};
+use super::{Bsdf, Conventions, LEAST_ALPHA, Shading, Textures};
 use crate::surface::Surface;
 use crate::texture::{ColorSpace, TextureLookup};
 use crate::{EffectSet, StageError};
@@ -54,6 +57,8 @@ pub(super) struct Pbr {
     dispersion: f32,
     /// What it calls for beside its base.
     layers: Option<Box<Layers>>,
+    /// What its rough boundary loses, if it is the boundary of a solid and that is made up for.
+    boundary: Option<Arc<Boundary>>,
 }
 
 /// What is taken away per unit of length, so that white turns into the attenuation colour over its distance.
@@ -95,6 +100,10 @@ impl Pbr {
             |texture: &Option<_>, space, wanted: bool| textures.get(texture.as_ref().filter(|_| wanted), space);
         let transmission =
             if has(EffectSet::REFRACTION) || has(EffectSet::TRANSMISSION) { desc.transmission } else { 0.0 };
+        let rough = desc.roughness_texture.is_some() || desc.roughness * desc.roughness > LEAST_ALPHA;
+        let bends = (desc.ior - 1.0).abs() > 1e-3 && desc.ior.is_finite();
+        let solid = desc.thickness > 0.0 && transmission > 0.0;
+        let rough_solid = conventions.energy_compensation && solid && rough && bends && !desc.unlit;
         Ok(Self {
             base_color: desc.base_color,
             base_color_texture: get(&desc.base_color_texture, ColorSpace::Srgb, textured)?,
@@ -126,6 +135,7 @@ impl Pbr {
             specular_color_texture: get(&desc.specular_color_texture, ColorSpace::Srgb, textured)?,
             dispersion: if has(EffectSet::DISPERSION) { desc.dispersion } else { 0.0 },
             layers,
+            boundary: rough_solid.then(|| Arc::new(Boundary::new(desc.ior))),
         })
     }
 
@@ -196,7 +206,7 @@ impl Pbr {
         let specular = self.specular * scalar::<TEXTURES>(self.specular_texture.as_ref(), surface);
         let tint = self.specular_color * color::<TEXTURES>(self.specular_color_texture.as_ref(), surface).xyz();
         let f0 = (tint * normal_incidence(self.ior)).min(Vec3::ONE) * specular;
-        Fresnel::Schlick { f0: f0.lerp(base, metallic), f90: Vec3::splat(specular).lerp(Vec3::ONE, metallic), eta }
+        Fresnel::Schlick { f0: f0.lerp(base, metallic), f90: specular + (1.0 - specular) * metallic, eta }
     }
 
     /// `LAYERS`: whether what is laid over the base is looked at. Materials that have nothing there are shaded by code
@@ -227,10 +237,18 @@ impl Pbr {
         let bare = self.fresnel::<TEXTURES>(surface, base, metallic, eta);
         let fresnel = layers.map_or(bare, |l| l.filmed::<TEXTURES>(surface, bare));
         let coat = fresnel.over_diffuse(self.specular_color != Vec3::ONE || self.specular_color_texture.is_some());
-        let compensation = match bare {
-            Fresnel::Schlick { f0, .. } if conventions.energy_compensation => energy::compensation(cos, roughness, f0),
-            _ => Vec3::ONE,
-        };
+        let mut compensation = Vec3::ONE;
+        let mut compensation_through = 1.0;
+        if let (true, Fresnel::Schlick { f0, .. }) = (conventions.energy_compensation, bare) {
+            compensation = energy::compensation(cos, roughness, f0);
+            if transmission > 0.0 {
+                compensation_through = match &self.boundary {
+                    Some(boundary) => boundary.compensation(cos, roughness, surface.front),
+                    None => energy::thin_compensation(cos, roughness),
+                };
+                compensation = compensation.lerp(Vec3::splat(compensation_through), transmission * (1.0 - metallic));
+            }
+        }
         let brush = layers.and_then(|l| l.brush::<TEXTURES>(surface));
         let mut bsdf = match &brush {
             Some(brush) => Bsdf::along(normal, brush.direction),
@@ -270,9 +288,12 @@ impl Pbr {
                 None => Lobe::GgxReflection(GgxReflection { alpha, fresnel, masking: Masking::Correlated, scale }),
             });
         }
-        let tint = base * ((1.0 - metallic) * transmission * below) * parted;
+        let mut tint = base * ((1.0 - metallic) * transmission * below) * parted;
         if tint.max_element() > 0.0 {
             let smooth = alpha <= LEAST_ALPHA;
+            if !smooth {
+                tint *= compensation_through;
+            }
             bsdf = bsdf.with(if (eta - 1.0).abs() > 1e-3 {
                 // KHR_materials_transmission leaves open how the index changes roughness; microfacets say it.
                 if smooth {

@@ -25,7 +25,7 @@ pub(crate) struct Clearcoat {
 }
 
 impl Clearcoat {
-    const FRESNEL: Fresnel = Fresnel::Schlick { f0: Vec3::splat(F0), f90: Vec3::ONE, eta: 1.0 };
+    const FRESNEL: Fresnel = Fresnel::Schlick { f0: Vec3::splat(F0), f90: 1.0, eta: 1.0 };
 
     /// What of the light below gets out towards a viewer at this cosine to the coat's normal.
     pub(crate) fn passed(weight: f32, cos: f32) -> f32 {

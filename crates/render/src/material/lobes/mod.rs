@@ -54,6 +54,8 @@ pub(crate) struct LobeSample {
 /// One part of a surface's scattering.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Lobe {
+    /// Nothing: in places that no lobe takes.
+    Nothing,
     /// Even in all directions.
     Lambert(Lambert),
     /// A mirror.
@@ -78,8 +80,9 @@ pub(crate) enum Lobe {
 
 /// Calls a method of whichever lobe it is.
 macro_rules! each {
-    ($self:ident, $lobe:ident => $body:expr) => {
+    ($self:ident, $lobe:ident => $body:expr, else $nothing:expr) => {
         match $self {
+            Lobe::Nothing => $nothing,
             Lobe::Lambert($lobe) => $body,
             Lobe::SpecularReflection($lobe) => $body,
             Lobe::SpecularTransmission($lobe) => $body,
@@ -98,6 +101,7 @@ impl Lobe {
     /// What it does.
     pub(crate) fn kind(&self) -> LobeKind {
         match self {
+            Self::Nothing => LobeKind::empty(),
             Self::Lambert(_) | Self::Sheen(_) => LobeKind::DIFFUSE,
             Self::SpecularReflection(_) | Self::GgxReflection(_) | Self::AnisotropicGgx(_) | Self::Clearcoat(_) => {
                 LobeKind::REFLECTION
@@ -116,17 +120,17 @@ impl Lobe {
 
     /// f(wo, wi) * |cos(wi)|; 0 for delta lobes.
     pub(crate) fn eval(&self, wo: Vec3, wi: Vec3) -> Vec3 {
-        each!(self, lobe => lobe.eval(wo, wi))
+        each!(self, lobe => lobe.eval(wo, wi), else Vec3::ZERO)
     }
 
     /// Density of [`Lobe::sample`] over solid angle; 0 for delta lobes.
     pub(crate) fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
-        each!(self, lobe => lobe.pdf(wo, wi))
+        each!(self, lobe => lobe.pdf(wo, wi), else 0.0)
     }
 
     /// Draws a direction. `None`: the light of this draw is lost.
     pub(crate) fn sample(&self, wo: Vec3, u: [f32; 2]) -> Option<LobeSample> {
-        each!(self, lobe => lobe.sample(wo, u))
+        each!(self, lobe => lobe.sample(wo, u), else None)
     }
 
     /// By how much radiance changes on the way through, beside what is lost: see `SpecularTransmission::scale`.
@@ -140,7 +144,7 @@ impl Lobe {
 
     /// About how much of the light from everywhere goes to `wo`: for choosing between lobes.
     pub(crate) fn albedo(&self, wo: Vec3) -> Vec3 {
-        each!(self, lobe => lobe.albedo(wo))
+        each!(self, lobe => lobe.albedo(wo), else Vec3::ZERO)
     }
 }
 

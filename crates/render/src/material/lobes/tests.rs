@@ -14,12 +14,12 @@ use crate::material::microfacet::Masking;
 use crate::material::thin_film::Film;
 
 fn schlick() -> Fresnel {
-    Fresnel::Schlick { f0: Vec3::new(0.04, 0.3, 0.9), f90: Vec3::ONE, eta: 1.0 }
+    Fresnel::Schlick { f0: Vec3::new(0.04, 0.3, 0.9), f90: 1.0, eta: 1.0 }
 }
 
 fn filmed() -> Fresnel {
     let film = Film { factor: 0.8, outside: 1.0, ior: 1.3, thickness: 400.0 };
-    Fresnel::Film { f0: Vec3::new(0.04, 0.3, 0.9), f90: Vec3::ONE, film }
+    Fresnel::Film { f0: Vec3::new(0.04, 0.3, 0.9), f90: 1.0, eta: 1.0, film }
 }
 
 /// All lobes that are not delta functions, with their names.
