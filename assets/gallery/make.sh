@@ -8,7 +8,8 @@ cargo build --release
 out=assets/gallery
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-render() { target/release/firsthit render "$@" --quiet; }
+# By Whitted's method, 16 samples where nothing else is said.
+render() { target/release/firsthit render --integrator whitted --max-depth 8 "$@" --quiet; }
 
 # The picture of the README, and those of the lecture.
 render assets/flight-helmet/FlightHelmet.gltf -s 64 --resolution 960x540 -o $out/flight-helmet.png
@@ -23,7 +24,7 @@ render assets/spot/spot.toml "${small[@]}" --integrator normal -o $out/lecture-n
 render assets/spot/spot.toml "${small[@]}" --integrator ao -o $out/lecture-occlusion.png
 render assets/spot/spot.toml "${small[@]}" --integrator barycentric -o $out/lecture-barycentric.png
 
-# The contact sheet: no flag but the size.
+# The contact sheet: no flag but the integrator and the size.
 models=(
   assets/flight-helmet/FlightHelmet.gltf assets/spot/spot.toml assets/cornell-box/CornellBox-Original.obj
   assets/cornell-box/CornellBox-Sphere.obj assets/cornell-box/CornellBox-Mirror.obj assets/lights-punctual/lights.gltf

@@ -2,11 +2,15 @@
 //! all come from these definitions.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
 use firsthit_geometry::Precision;
 use firsthit_import::UpAxis;
-use firsthit_render::{CameraChoice, Crop, EffectOverrides, IntegratorChoice, TextureFilter, ViewTransform};
+use firsthit_render::sampler::SamplerChoice;
+use firsthit_render::{
+    CameraChoice, Crop, EffectOverrides, FilterChoice, IntegratorChoice, TextureFilter, ViewTransform,
+};
 use glam::DVec3;
 
 use crate::accuracy::AccuracyArgs;
@@ -27,7 +31,10 @@ Exit codes: 0 done, 1 loading or rendering failed, 2 wrong usage, 130 interrupte
 const RENDER_EXAMPLES: &str = "\
 Examples:
   firsthit render helmet.glb
-      Frame the model, light it with the studio and write helmet.png.
+      Frame the model, light it with the studio and write helmet.png: by path tracing, until it looks clean, for at
+      most a minute.
+  firsthit render helmet.glb --integrator whitted
+      A quick look: direct light, mirrors and glass, without the light that surfaces send to each other.
   firsthit render room.glb --camera 0 -s 256 -t 2 -o room.exr
       The file's first camera, 256 samples per pixel on two threads, as OpenEXR.
   firsthit render engine.obj --up +Z --clip-plane 1,0,0,0
@@ -141,12 +148,31 @@ pub(crate) struct OutputArgs {
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Quality")]
 pub(crate) struct QualityArgs {
-    /// Samples per pixel
-    #[arg(short, long, visible_alias = "samples", value_name = "N", default_value = "16",
+    /// Samples per pixel; with --noise-threshold or --time-limit the most of them [default: with path at most 1024, as
+    /// the noise asks for, else 16]
+    #[arg(short, long, visible_alias = "samples", value_name = "N",
           value_parser = clap::value_parser!(u32).range(1..))]
-    pub(crate) spp: u32,
+    pub(crate) spp: Option<u32>,
 
-    /// Most bounces of a path; 1 is direct light [default: the scene file's, else 8]
+    /// Take samples until the estimated noise of each tile of the image is below this; 0.1 is rough, 0.01 clean
+    /// [default: 0.03 with path, unless --spp is given]
+    #[arg(long, value_name = "E", value_parser = values::positive)]
+    pub(crate) noise_threshold: Option<f64>,
+
+    /// Take no more samples after this time, as 30s, 5m or 1h [default: 60s with path, unless --spp or
+    /// --noise-threshold is given]
+    #[arg(long, value_name = "TIME", value_parser = values::time)]
+    pub(crate) time_limit: Option<Duration>,
+
+    /// Where sample points come from: sobol, or independent random numbers for comparison
+    #[arg(long, value_name = "NAME", default_value = "sobol", value_parser = values::sampler)]
+    pub(crate) sampler: SamplerChoice,
+
+    /// How samples of a pixel weigh by their place: auto, box or blackman-harris
+    #[arg(long, value_name = "NAME", default_value = "auto", value_parser = values::filter)]
+    pub(crate) filter: FilterChoice,
+
+    /// Most bounces of a path; 1 is direct light [default: the scene file's, else 16]
     #[arg(long, value_name = "N")]
     pub(crate) max_depth: Option<u32>,
 
@@ -154,7 +180,7 @@ pub(crate) struct QualityArgs {
     #[arg(long, value_name = "N", default_value = "0")]
     pub(crate) seed: u64,
 
-    /// How light is computed: auto, whitted, direct, ao, or the name of an --aov as the picture
+    /// How light is computed: path (as auto), whitted, direct, ao, or the name of an --aov as the picture
     #[arg(long, value_name = "NAME", default_value = "auto", value_parser = values::integrator)]
     pub(crate) integrator: IntegratorChoice,
 

@@ -183,7 +183,7 @@ mod tests {
             clip-plane = [[1, 0, 0, 5], "0,-1,0,2"]
         "#;
         let args = with(text, &[]).unwrap();
-        assert_eq!(args.quality.spp, 4);
+        assert_eq!(args.quality.spp, Some(4));
         assert_eq!(args.output.resolution.map(|r| (r.width, r.height)), Some((64, 32)));
         assert_eq!(args.output.crop.map(|c| c.height), Some(4));
         assert_eq!(args.output.exposure, -0.5);
@@ -201,7 +201,7 @@ mod tests {
         let text = text.replace("config-less = 1", "progress = true");
         let typed = ["-s", "9", "--background-color", "1,1,1", "--clip-plane", "0,1,0,1", "-v", "--no-progress"];
         let args = with(&text, &typed).unwrap();
-        assert_eq!(args.quality.spp, 9);
+        assert_eq!(args.quality.spp, Some(9));
         assert!(args.scene.background_color.is_some() && !args.scene.no_background);
         assert_eq!(args.scene.clip_plane.iter().map(|p| p.normal.y).collect::<Vec<_>>(), [1.0]);
         assert!(args.run.verbose && !args.run.quiet);
@@ -229,6 +229,6 @@ mod tests {
     #[test]
     fn repeated_options_of_the_command_line_are_kept_or_overridden() {
         let args = with("", &["-s", "1", "-s", "2", "--clip-plane=1,0,0,0", "--clip-plane=-1,0,0,0"]).unwrap();
-        assert_eq!((args.quality.spp, args.scene.clip_plane.len()), (2, 2));
+        assert_eq!((args.quality.spp, args.scene.clip_plane.len()), (Some(2), 2));
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use firsthit_accel::{BuildOptions, SceneBuilder};
 use firsthit_import::scene::Settings;
@@ -13,12 +13,12 @@ use firsthit_render::{
     output::{BitDepth, WriteOptions, write_film, write_png},
 };
 
-use crate::args::{CameraArgs, RenderArgs};
+use crate::args::{CameraArgs, QualityArgs, RenderArgs};
 use crate::console::{Console, message, print, print_json};
 use crate::error::{Exit, Failure};
 use crate::hdri;
 use crate::interrupt::Interrupt;
-use crate::progress::{Progress, Style};
+use crate::progress::{Progress, Style, duration};
 use crate::report::{Counts, RenderReport, Seconds, effects, explain_effects, rays_in_words, warnings};
 use crate::simd;
 use crate::target::Target;
@@ -88,6 +88,16 @@ impl Job<'_> {
             stage.explain().iter().for_each(|line| self.console.detail(line));
         }
 
+        if Effort::new(&args.quality).announce
+            && let (Some(noise), Some(limit)) = (options.noise_threshold, options.time_limit)
+        {
+            self.console.say(format_args!(
+                "rendering until the noise is below {noise}, with at most {} samples per pixel and for at most {} \
+                 (--noise-threshold, --spp, --time-limit)",
+                options.spp,
+                duration(limit.as_secs_f64()),
+            ));
+        }
         let started = Instant::now();
         self.interrupt.begin();
         let style = Style::new(args.run.progress, args.run.no_progress, args.run.quiet);
@@ -124,6 +134,8 @@ impl Job<'_> {
                 seconds,
                 rays: rendered.stats.rays.by_name().into_iter().collect(),
                 samples: rendered.stats.samples,
+                noise: rendered.stats.noise,
+                out_of_time: rendered.out_of_time,
                 bad_samples: rendered.stats.bad_samples,
                 interrupted: rendered.interrupted,
                 effects: effects(&rendered.effects),
@@ -176,9 +188,17 @@ impl Job<'_> {
 
     /// What was done, in one line.
     fn summary(&self, rendered: &Rendered, counts: Counts, seconds: Seconds) -> String {
-        let done = if rendered.interrupted { "interrupted, image so far" } else { "done" };
+        let done = match (rendered.interrupted, rendered.out_of_time) {
+            (true, _) => "interrupted, image so far",
+            (false, true) => "time is up",
+            (false, false) => "done",
+        };
+        let window = rendered.film.window();
+        let pixels = f64::from(window.width) * f64::from(window.height);
+        let noise = rendered.stats.noise.map_or(String::new(), |n| format!(", noise at most {n:.3}"));
         format!(
-            "{done}: {counts}, {}; load {:.2} s, build {:.2} s, render {:.2} s; wrote {}",
+            "{done}: {counts}, {:.0} samples per pixel{noise}, {}; load {:.2} s, build {:.2} s, render {:.2} s; wrote {}",
+            rendered.stats.samples as f64 / pixels,
             rays_in_words(&rendered.stats.rays),
             seconds.load,
             seconds.build,
@@ -189,6 +209,30 @@ impl Job<'_> {
 
     fn at_model(&self, error: &dyn std::error::Error) -> Failure {
         Failure::failed(format_args!("{}: {error}", self.args.model.display()))
+    }
+}
+
+/// How many samples are taken.
+struct Effort {
+    spp: u32,
+    noise_threshold: Option<f32>,
+    time_limit: Option<Duration>,
+    /// The time limit is nobody's wish: it is said beforehand.
+    announce: bool,
+}
+
+impl Effort {
+    fn new(args: &QualityArgs) -> Self {
+        let asked = args.noise_threshold.map(|e| e as f32);
+        let adaptive = matches!(args.integrator, IntegratorChoice::Auto | IntegratorChoice::Path);
+        let (spp, noise_threshold, time_limit) = match (args.spp, asked, args.time_limit) {
+            (Some(spp), asked, limit) => (spp, asked, limit),
+            (None, None, limit) if adaptive => (1024, Some(0.03), Some(limit.unwrap_or(Duration::from_secs(60)))),
+            (None, None, None) => (16, None, None),
+            (None, asked, limit) => (1024, asked, limit),
+        };
+        let announce = time_limit.is_some() && args.time_limit.is_none();
+        Self { spp, noise_threshold, time_limit, announce }
     }
 }
 
@@ -207,10 +251,15 @@ fn render_options(args: &RenderArgs, settings: &Settings) -> Result<RenderOption
         }
     }
     let file_depth = settings.max_path_edges.map(|edges| edges.saturating_sub(1));
+    let effort = Effort::new(&args.quality);
     Ok(RenderOptions {
         width,
         height,
-        spp: args.quality.spp,
+        spp: effort.spp,
+        noise_threshold: effort.noise_threshold,
+        time_limit: effort.time_limit,
+        sampler: args.quality.sampler,
+        filter: args.quality.filter,
         max_depth: args.quality.max_depth.or(file_depth).unwrap_or(defaults.max_depth),
         seed: args.quality.seed,
         integrator: args.quality.integrator,

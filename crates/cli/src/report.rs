@@ -34,6 +34,10 @@ pub(crate) struct RenderReport<'a> {
     /// Rays cast, by kind.
     pub(crate) rays: BTreeMap<&'static str, u64>,
     pub(crate) samples: u64,
+    /// Estimated noise of the noisiest tile; `null` below 32 samples.
+    pub(crate) noise: Option<f32>,
+    /// Whether the time limit ended it.
+    pub(crate) out_of_time: bool,
     /// Samples that were not finite and count as black.
     pub(crate) bad_samples: u64,
     pub(crate) interrupted: bool,

@@ -2,12 +2,14 @@
 
 use std::path::PathBuf;
 use std::str::FromStr;
+use std::time::Duration;
 
 use firsthit_accel::{BuildQuality, Layout};
 use firsthit_import::srgb;
 use firsthit_measure::scenario::{self, Scenario};
+use firsthit_render::sampler::SamplerChoice;
 use firsthit_render::{
-    Aov, CameraChoice, Crop, EffectOverrides, EffectSet, IntegratorChoice, TextureFilter, ViewTransform,
+    Aov, CameraChoice, Crop, EffectOverrides, EffectSet, FilterChoice, IntegratorChoice, TextureFilter, ViewTransform,
 };
 use glam::{DVec3, Vec3};
 
@@ -72,6 +74,32 @@ pub(crate) fn number(s: &str) -> Result<f64, String> {
 
 pub(crate) fn positive(s: &str) -> Result<f64, String> {
     finite(s).filter(|&x| x > 0.0).ok_or_else(|| "expected a number above 0".into())
+}
+
+/// A number of seconds, minutes or hours.
+pub(crate) fn time(s: &str) -> Result<Duration, String> {
+    let units = [("ms", 1e-3), ("s", 1.0), ("m", 60.0), ("min", 60.0), ("h", 3600.0), ("", 1.0)];
+    let split = s.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(s.len());
+    let (number, unit) = s.split_at(split);
+    let seconds = units.iter().find(|(name, _)| *name == unit).and_then(|(_, size)| Some(finite(number)? * size));
+    seconds
+        .filter(|s| *s > 0.0)
+        .and_then(|s| Duration::try_from_secs_f64(s).ok())
+        .ok_or_else(|| "expected a time above 0, as in 30s, 5m or 1h".into())
+}
+
+pub(crate) fn sampler(s: &str) -> Result<SamplerChoice, String> {
+    let found = SamplerChoice::ALL.into_iter().find(|c| c.name() == s);
+    found.ok_or_else(|| format!("expected one of: {}", SamplerChoice::ALL.map(SamplerChoice::name).join(", ")))
+}
+
+pub(crate) fn filter(s: &str) -> Result<FilterChoice, String> {
+    Ok(match s {
+        "auto" => FilterChoice::Auto,
+        "box" => FilterChoice::Box,
+        "blackman-harris" => FilterChoice::BlackmanHarris,
+        _ => return Err("expected auto, box or blackman-harris".into()),
+    })
 }
 
 pub(crate) fn view_angle(s: &str) -> Result<f64, String> {
@@ -162,12 +190,14 @@ pub(crate) fn hdri(s: &str) -> Result<Hdri, String> {
 pub(crate) fn integrator(s: &str) -> Result<IntegratorChoice, String> {
     Ok(match s {
         "auto" => IntegratorChoice::Auto,
+        "path" => IntegratorChoice::Path,
         "whitted" => IntegratorChoice::Whitted,
         "direct" => IntegratorChoice::Direct,
         "ao" | "ambient-occlusion" => IntegratorChoice::AmbientOcclusion,
         other => {
-            let aov = Aov::from_str(other)
-                .map_err(|_| format!("expected auto, whitted, direct, ao, or one of: {}", aov_names()))?;
+            let aov = Aov::from_str(other).ok().filter(|a| a.is_sampled());
+            let aov =
+                aov.ok_or_else(|| format!("expected auto, path, whitted, direct, ao, or one of: {}", aov_names()))?;
             IntegratorChoice::Aov(aov)
         }
     })
@@ -335,10 +365,18 @@ mod tests {
     }
 
     #[test]
+    fn times_have_units() {
+        let seconds = |s: &str| time(s).map(|t| t.as_secs_f64());
+        assert_eq!(["30s", "1.5", "2m", "1h", "250ms"].map(seconds), [30.0, 1.5, 120.0, 3600.0, 0.25].map(Ok));
+        assert!(["0s", "-1s", "", "s", "5 days", "nan", "1e400"].iter().all(|s| time(s).is_err()));
+    }
+
+    #[test]
     fn every_aov_is_an_integrator_too() {
-        for aov in Aov::ALL {
+        for aov in Aov::ALL.into_iter().filter(|a| a.is_sampled()) {
             assert_eq!(integrator(aov.name()), Ok(IntegratorChoice::Aov(aov)));
         }
+        assert!(integrator("samples").is_err(), "known of a pixel as a whole");
         assert_eq!(integrator("ao"), Ok(IntegratorChoice::AmbientOcclusion));
         assert!(integrator("path-of-least-resistance").is_err());
         assert_eq!(aovs("depth,normal,depth"), Ok(AovList(vec![Aov::Depth, Aov::Normal])));

@@ -339,6 +339,28 @@ fn json_reports_the_render() {
 }
 
 #[test]
+fn without_a_number_samples_are_taken_until_the_noise_is_low_or_time_is_up() {
+    let folder = Folder::new();
+    let render = |args: &[&str]| folder.run(&[&["render", "cube.obj", "--resolution", "16x16"], args].concat()).code(0);
+    let text = render(&[]).stderr();
+    for word in ["noise is below 0.03", "at most 1024 samples per pixel", "at most 1 min 00 s", "noise at most 0.0"] {
+        assert!(text.contains(word), "no '{word}' in: {text}");
+    }
+    let report = render(&["--noise-threshold", "1000", "--json", "--aov", "samples,variance"]).json();
+    assert_eq!((report["samples"].as_u64(), report["out_of_time"].as_bool()), (Some(16 * 16 * 32), Some(false)));
+    assert!(report["noise"].as_f64().is_some_and(|n| n < 1.0));
+    assert!(folder.path("cube.samples.exr").exists() && folder.path("cube.variance.exr").exists());
+    let run = render(&["--time-limit", "1ms", "--noise-threshold=1e-9", "-s", "1000000", "--json"]);
+    assert_eq!(run.json()["out_of_time"], true);
+    assert!(run.stderr().contains("time is up: 12 triangles"), "{}", run.stderr());
+    let whitted = render(&["--integrator", "whitted", "--json"]).json();
+    assert_eq!((whitted["samples"].as_u64(), whitted["noise"].is_null()), (Some(16 * 16 * 16), true));
+    let seeds = [render(&["-s", "8", "--sampler", "independent", "--json"]), render(&["-s", "8", "--json"])];
+    assert!(seeds.iter().all(|run| run.json()["samples"] == 16 * 16 * 8));
+    folder.run(&["render", "cube.obj", "--time-limit", "soon"]).fails(2, &["expected a time"]);
+}
+
+#[test]
 fn explain_says_what_was_chosen_and_what_each_effect_cost() {
     let folder = Folder::new();
     let run = folder.render(&["--explain"]).code(0);
@@ -402,7 +424,8 @@ fn options_come_in_either_form_and_negative_numbers_are_values() {
 #[test]
 fn every_integrator_and_precision_renders() {
     let folder = Folder::new();
-    let names = ["auto", "whitted", "direct", "ao", "depth", "normal", "geometric-normal", "albedo", "uv", "heat"];
+    let names =
+        ["auto", "path", "whitted", "direct", "ao", "depth", "normal", "geometric-normal", "albedo", "uv", "heat"];
     for name in names.into_iter().chain(["barycentric", "instance-id", "material-id", "primitive-id"]) {
         folder.render(&["--integrator", name]).code(0);
     }
@@ -465,7 +488,7 @@ fn the_configuration_file_comes_before_the_command_line() {
     let named = report(&["--config", "other.toml"]);
     assert_eq!((of(&named, "width"), of(&named, "seed")), (16, 0), "it replaces the implicit one");
     let none = report(&["--no-config", "--resolution", "12x6"]);
-    assert_eq!((of(&none, "width"), of(&none, "spp"), of(&none, "seed")), (12, 16, 0));
+    assert_eq!((of(&none, "width"), of(&none, "spp"), of(&none, "seed")), (12, 1024, 0));
     assert_eq!(none["output"], "cube.png");
 
     folder.write("firsthit.toml", "camera_position = [1, 2, 3]\n");

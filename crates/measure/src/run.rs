@@ -294,7 +294,8 @@ impl Run<'_> {
             Effort::Thorough => (640, 360, 4),
             _ => (320, 180, 1),
         };
-        let render = RenderOptions { width, height, spp, seed: self.options.seed, ..RenderOptions::default() };
+        let of_tiers = PictureOptions::default().render;
+        let render = RenderOptions { width, height, spp, seed: self.options.seed, ..of_tiers };
         let build = BuildOptions { simd: self.options.simd, ..BuildOptions::default() };
         let tiers = self.options.tiers.clone();
         let options = PictureOptions { tiers, render, build, ..PictureOptions::default() };

@@ -27,11 +27,16 @@ pub enum Aov {
     PrimitiveId,
     /// Boxes and primitives tested, as a heat map.
     Heat,
+    /// How many samples a pixel got.
+    Samples,
+    /// Estimated variance of each colour of the picture, linear: its square root is how far it may be off. Infinite
+    /// below 32 samples.
+    Variance,
 }
 
 impl Aov {
     /// All of them.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 12] = [
         Self::Depth,
         Self::Normal,
         Self::GeometricNormal,
@@ -42,7 +47,16 @@ impl Aov {
         Self::MaterialId,
         Self::PrimitiveId,
         Self::Heat,
+        Self::Samples,
+        Self::Variance,
     ];
+
+    /// Whether each sample has a value of it; the others are known of a pixel as a whole, and are no pictures of their
+    /// own.
+    #[must_use]
+    pub const fn is_sampled(self) -> bool {
+        !matches!(self, Self::Samples | Self::Variance)
+    }
 
     /// The name used on command lines and of layers in files.
     #[must_use]
@@ -58,6 +72,8 @@ impl Aov {
             Self::MaterialId => "material-id",
             Self::PrimitiveId => "primitive-id",
             Self::Heat => "heat",
+            Self::Samples => "samples",
+            Self::Variance => "variance",
         }
     }
 }

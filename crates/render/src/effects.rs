@@ -54,12 +54,14 @@ bitflags! {
         const DIFFUSE_TRANSMISSION = 1 << 24;
         /// Indices of refraction that differ between colours.
         const DISPERSION = 1 << 25;
+        /// Light that surfaces send to each other. Only path tracing simulates it.
+        const INDIRECT_LIGHT = 1 << 17;
     }
 }
 
 impl EffectSet {
     /// Every single effect with the name that command lines and reports use, in the order of reports.
-    pub const NAMES: [(Self, &'static str); 23] = [
+    pub const NAMES: [(Self, &'static str); 24] = [
         (Self::SHADOWS, "shadows"),
         (Self::PUNCTUAL_LIGHTS, "punctual-lights"),
         (Self::AREA_LIGHTS, "area-lights"),
@@ -83,6 +85,7 @@ impl EffectSet {
         (Self::ANISOTROPY, "anisotropy"),
         (Self::DIFFUSE_TRANSMISSION, "diffuse-transmission"),
         (Self::DISPERSION, "dispersion"),
+        (Self::INDIRECT_LIGHT, "indirect-light"),
     ];
 
     /// The set with one effect of this name (`ao` is short for `ambient-occlusion`).
@@ -155,6 +158,13 @@ impl EffectPlan {
         }
     }
 
+    /// Notes that an effect is not simulated, whatever is called for.
+    pub(crate) fn leave(&mut self, effect: EffectSet) {
+        for entry in self.entries.iter_mut().filter(|e| effect.contains(e.effect)) {
+            entry.simulated = false;
+        }
+    }
+
     /// Decides what is simulated: what is called for, changed by the caller's wishes.
     pub(crate) fn decide(&mut self, wishes: &crate::EffectOverrides) {
         let set = (wishes.only.unwrap_or_else(|| self.called_for()) | wishes.add) - wishes.remove;
@@ -199,8 +209,8 @@ impl EffectPlan {
 /// The kinds of rays that are cast for an effect alone.
 fn kinds_of(effect: EffectSet) -> &'static [RayKind] {
     use RayKind::{
-        AmbientOcclusion, Reflection, Refraction, ShadowArea, ShadowEnvironment, ShadowPunctual, Transmission,
-        Transparency,
+        AmbientOcclusion, Indirect, Reflection, Refraction, ShadowArea, ShadowEnvironment, ShadowPunctual,
+        Transmission, Transparency,
     };
     match effect {
         EffectSet::SHADOWS => &[ShadowPunctual, ShadowArea, ShadowEnvironment],
@@ -208,6 +218,7 @@ fn kinds_of(effect: EffectSet) -> &'static [RayKind] {
         EffectSet::AREA_LIGHTS => &[ShadowArea],
         EffectSet::ENVIRONMENT => &[ShadowEnvironment],
         EffectSet::REFLECTION => &[Reflection],
+        EffectSet::INDIRECT_LIGHT => &[Indirect],
         EffectSet::REFRACTION => &[Refraction],
         EffectSet::TRANSMISSION => &[Transmission],
         EffectSet::ALPHA_BLEND => &[Transparency],

@@ -18,6 +18,8 @@ const BLOCK: u32 = 16;
 pub struct Accumulator {
     total: [f64; 4],
     block: [f32; 4],
+    /// Sums of the squares of whole blocks' sums.
+    squares: [f32; 3],
     count: u32,
 }
 
@@ -31,8 +33,30 @@ impl Accumulator {
         self.count += 1;
         if self.count.is_multiple_of(BLOCK) {
             self.total = self.sum();
+            for (square, x) in self.squares.iter_mut().zip(self.block) {
+                *square += x * x;
+            }
             self.block = [0.0; 4];
         }
+    }
+
+    /// An estimate of the variance of the mean of each colour: how far it is off, squared. It comes from how much
+    /// whole blocks of 16 samples differ, so it knows what samples gain by their order within a block, but not what
+    /// blocks gain by theirs. `None` before there are two blocks.
+    #[must_use]
+    pub fn variance(&self) -> Option<[f32; 3]> {
+        let blocks = self.count / BLOCK;
+        if blocks < 2 {
+            return None;
+        }
+        let n = f64::from(blocks);
+        let block = f64::from(BLOCK);
+        Some(std::array::from_fn(|c| {
+            let mean = self.total[c] / n;
+            let spread = (f64::from(self.squares[c]) / n - mean * mean).max(0.0);
+            // Of a block's mean, by the number of blocks but one; of the mean of all blocks.
+            (spread / (block * block) / (n - 1.0)) as f32
+        }))
     }
 
     /// How many samples there are.
@@ -69,6 +93,8 @@ pub struct Film {
     size: (u32, u32),
     window: Crop,
     aovs: Vec<Aov>,
+    /// Pictures that samples add to.
+    layers: usize,
     /// Row by row, pixel by pixel: the colour, then the AOVs in their order.
     pixels: Vec<Accumulator>,
 }
@@ -83,7 +109,7 @@ struct Cut {
 
 impl Cut {
     fn new(film: &Film, rows: u32) -> Self {
-        Self { window: film.window, layers: 1 + film.aovs.len(), rows: rows.max(1) }
+        Self { window: film.window, layers: film.layers, rows: rows.max(1) }
     }
 
     /// Pixels of a band, in all layers; at least 1.
@@ -124,11 +150,12 @@ impl Film {
     pub fn new(width: u32, height: u32, crop: Option<Crop>, aovs: &[Aov]) -> Result<Self, TryReserveError> {
         let window = held(width, height, crop);
         let aovs = each_once(aovs);
-        let count = (window.width as usize).saturating_mul(window.height as usize).saturating_mul(1 + aovs.len());
+        let layers = 1 + each_once(&aovs).iter().filter(|a| a.is_sampled()).count();
+        let count = (window.width as usize).saturating_mul(window.height as usize).saturating_mul(layers);
         let mut pixels = Vec::new();
         pixels.try_reserve_exact(count)?;
         pixels.resize(count, Accumulator::default());
-        Ok(Self { size: (width, height), window, aovs, pixels })
+        Ok(Self { size: (width, height), window, aovs, layers, pixels })
     }
 
     /// The memory that [`Film::new`] would take with the same arguments, in bytes.
@@ -137,7 +164,18 @@ impl Film {
         let window = held(width, height, crop);
         let layer =
             (u64::from(window.width) * u64::from(window.height)).saturating_mul(size_of::<Accumulator>() as u64);
-        layer.saturating_mul(1 + each_once(aovs).len() as u64)
+        layer.saturating_mul(1 + each_once(aovs).iter().filter(|a| a.is_sampled()).count() as u64)
+    }
+
+    /// The pictures beside the colour that samples add to, in the order of [`Band::pixel`].
+    pub(crate) fn sampled(&self) -> impl Iterator<Item = Aov> {
+        self.aovs.iter().copied().filter(|a| a.is_sampled())
+    }
+
+    /// The colour of a pixel by its place in the whole picture.
+    pub(crate) fn of_color(&self, x: u32, y: u32) -> &Accumulator {
+        let i = (y - self.window.y) as usize * self.window.width as usize + (x - self.window.x) as usize;
+        &self.pixels[i * self.layers]
     }
 
     /// Width and height of the whole picture, of which [`Film::window`] is held.
@@ -181,7 +219,15 @@ impl Film {
     /// multiplied). Where there are none, 0, and for depth infinity.
     #[must_use]
     pub fn aov(&self, aov: Aov) -> Option<Picture> {
-        let layer = 1 + self.aovs.iter().position(|a| *a == aov)?;
+        if !self.aovs.contains(&aov) {
+            return None;
+        }
+        match aov {
+            Aov::Samples => return Some(self.picture(0, |pixel| spread_out([pixel.count() as f32; 3]))),
+            Aov::Variance => return Some(self.picture(0, |p| spread_out(p.variance().unwrap_or([f32::INFINITY; 3])))),
+            _ => {}
+        }
+        let layer = 1 + self.sampled().position(|a| a == aov)?;
         let nothing = if aov == Aov::Depth { f32::INFINITY } else { 0.0 };
         Some(self.picture(layer, |pixel| {
             let [x, y, z, covered] = pixel.mean();
@@ -194,8 +240,7 @@ impl Film {
     }
 
     fn picture(&self, layer: usize, value: impl Fn(&Accumulator) -> [f32; 4]) -> Picture {
-        let layers = 1 + self.aovs.len();
-        let pixels = self.pixels.iter().skip(layer).step_by(layers).map(value).collect();
+        let pixels = self.pixels.iter().skip(layer).step_by(self.layers).map(value).collect();
         Picture { width: self.window.width, height: self.window.height, pixels }
     }
 }
@@ -224,6 +269,11 @@ impl Band<'_> {
         let i = (y - self.first_row) as usize * self.window.width as usize + (x - self.window.x) as usize;
         &mut self.pixels[i * self.layers..][..self.layers]
     }
+}
+
+/// Values of a whole pixel.
+fn spread_out([x, y, z]: [f32; 3]) -> [f32; 4] {
+    [x, y, z, 1.0]
 }
 
 /// A crop window cut to the picture; without one, the whole picture.
@@ -317,6 +367,44 @@ mod tests {
         assert_eq!(depth.pixels[1], [f32::INFINITY, f32::INFINITY, f32::INFINITY, 0.0]);
         assert_eq!(film.aov(Aov::Normal).unwrap().pixels[0], [0.0; 4]);
         assert!(film.aov(Aov::Uv).is_none());
+    }
+
+    /// The mean of many estimates of the variance of a mean is that variance.
+    #[test]
+    fn the_variance_is_that_of_the_mean() {
+        let (blocks, pixels) = (4, 4000_u32);
+        let (mut estimate, mut square) = (0.0, 0.0);
+        for p in 0..pixels {
+            let mut a = Accumulator::default();
+            for i in 0..blocks * 16 {
+                assert_eq!(a.variance().is_some(), a.count() >= 32);
+                let mut x = (p * 64 + i).wrapping_mul(0x9e37_79b9);
+                x = (x ^ (x >> 16)).wrapping_mul(0x7feb_352d);
+                x = (x ^ (x >> 15)).wrapping_mul(0x846c_a68b);
+                let x = (x ^ (x >> 16)) as f32 / 4_294_967_296.0;
+                a.add([x, 2.0 * x, 1.0, 1.0]);
+            }
+            let variance = a.variance().unwrap();
+            assert!((variance[1] - 4.0 * variance[0]).abs() < 1e-5 && variance[2] < 1e-9);
+            estimate += f64::from(variance[0]) / f64::from(pixels);
+            square += (f64::from(a.mean()[0]) - 0.5).powi(2) / f64::from(pixels);
+        }
+        let exact = 1.0 / 12.0 / 64.0;
+        assert!((estimate / exact - 1.0).abs() < 0.05, "{estimate} instead of {exact}");
+        assert!((square / exact - 1.0).abs() < 0.1, "{square} instead of {exact}");
+    }
+
+    #[test]
+    fn what_is_known_of_the_samples_takes_no_layer_of_its_own() {
+        let mut film = Film::new(2, 1, None, &[Aov::Samples, Aov::Normal, Aov::Variance]).unwrap();
+        assert_eq!(Film::bytes(2, 1, None, film.aovs()), Film::bytes(2, 1, None, &[Aov::Normal]));
+        let mut band = film.bands_mut(1).next().unwrap();
+        assert_eq!(band.pixel(0, 0).len(), 2);
+        (0..32).for_each(|_| band.pixel(1, 0)[0].add([1.0, 1.0, 1.0, 1.0]));
+        let samples = film.aov(Aov::Samples).unwrap();
+        assert_eq!([samples.pixels[0][0], samples.pixels[1][0]], [0.0, 32.0]);
+        let variance = film.aov(Aov::Variance).unwrap();
+        assert_eq!([variance.pixels[0][0], variance.pixels[1][0]], [f32::INFINITY, 0.0]);
     }
 
     #[test]

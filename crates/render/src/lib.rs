@@ -11,6 +11,7 @@ mod integrator;
 pub mod light;
 mod material;
 mod monitor;
+mod noise;
 mod options;
 pub mod output;
 mod render;
@@ -31,8 +32,8 @@ pub use film::Film;
 pub use light::environment::Environment;
 pub use monitor::Monitor;
 pub use options::{
-    Background, CameraChanges, CameraChoice, Clip, Crop, EffectOverrides, EnvironmentChoice, IntegratorChoice,
-    RenderOptions, StageOptions, TextureFilter,
+    Background, CameraChanges, CameraChoice, Clip, Crop, EffectOverrides, EnvironmentChoice, FilterChoice,
+    IntegratorChoice, RenderOptions, StageOptions, TextureFilter,
 };
 pub use render::{RenderError, Rendered, render};
 pub use stage::{Stage, StageError};

@@ -1,19 +1,31 @@
 //! What the caller wants of a picture.
 
+use std::time::Duration;
+
 use firsthit_import::scene::ImageDesc;
 use glam::{DVec3, Vec3};
 
+use crate::sampler::SamplerChoice;
 use crate::{Aov, EffectSet};
 
-/// Everything about how a stage is rendered. The defaults are what `firsthit render MODEL` uses.
+/// Everything about how a stage is rendered.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderOptions {
     /// Picture width, pixels.
     pub width: u32,
     /// Picture height, pixels.
     pub height: u32,
-    /// Samples per pixel, >= 1.
+    /// Samples per pixel, >= 1; with a noise threshold or a time limit the most of them.
     pub spp: u32,
+    /// Tiles of 16 x 16 pixels get no more samples once their noise is estimated to be below this: the root of the
+    /// mean of variance / (value^2 + 0.01). 0.03 looks clean. At least 32 samples are taken, if `spp` allows.
+    pub noise_threshold: Option<f32>,
+    /// No more samples are taken after this time, but every pixel gets one.
+    pub time_limit: Option<Duration>,
+    /// Where sample points come from.
+    pub sampler: SamplerChoice,
+    /// How samples of a pixel weigh by their place.
+    pub filter: FilterChoice,
     /// Most bounces: path edges - 1. 0: only what the camera sees glowing; 1: direct light.
     pub max_depth: u32,
     /// Same seed, same bits.
@@ -34,7 +46,11 @@ impl Default for RenderOptions {
             width: 1280,
             height: 720,
             spp: 16,
-            max_depth: 8,
+            noise_threshold: None,
+            time_limit: None,
+            sampler: SamplerChoice::Sobol,
+            filter: FilterChoice::Auto,
+            max_depth: 16,
             seed: 0,
             integrator: IntegratorChoice::Auto,
             crop: None,
@@ -48,9 +64,11 @@ impl Default for RenderOptions {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum IntegratorChoice {
-    /// Today: `Whitted`.
+    /// `Path`.
     #[default]
     Auto,
+    /// All ways that light takes, by path tracing.
+    Path,
     /// Direct light, mirror reflection, refraction, transparency.
     Whitted,
     /// Direct light alone.
@@ -59,6 +77,18 @@ pub enum IntegratorChoice {
     AmbientOcclusion,
     /// One of the pictures beside the colour as the main one.
     Aov(Aov),
+}
+
+/// How samples of a pixel weigh by their place.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum FilterChoice {
+    /// Even in reference scenes, else smooth.
+    #[default]
+    Auto,
+    /// Even over the pixel's own square.
+    Box,
+    /// The Blackman-Harris window of radius 1.5 pixels.
+    BlackmanHarris,
 }
 
 /// A window of the picture, in pixels from the upper left.

@@ -15,9 +15,11 @@ use crate::filter::Filter;
 use crate::integrator::whitted::{Limits, Seen};
 use crate::integrator::{Timing, Tracer};
 use crate::material::lobes::LobeKind;
+use crate::noise::Tiles;
 use crate::sampler::{Dimension, PixelSampler};
 use crate::{
-    Aov, Clip, EffectPlan, EffectSet, Film, IntegratorChoice, Monitor, RayCounts, RenderOptions, RenderStats, Stage,
+    Aov, Clip, EffectPlan, EffectSet, Film, FilterChoice, IntegratorChoice, Monitor, RayCounts, RenderOptions,
+    RenderStats, Stage,
 };
 
 /// Options that no picture can be made with.
@@ -81,6 +83,8 @@ pub struct Rendered {
     pub effects: EffectPlan,
     /// Whether it was cancelled: the film then has fewer samples, but all of the picture if one pass was finished.
     pub interrupted: bool,
+    /// Whether the time was up before all samples were taken, or all tiles were as good as wanted.
+    pub out_of_time: bool,
 }
 
 /// No path has more bounces, whatever is asked for: between perfect mirrors it would never end.
@@ -96,7 +100,9 @@ const FOOTPRINT: f64 = 0.5;
 ///
 /// The same stage, options and seed give the same bits for any number of threads: every sample is a pure function of
 /// seed, pixel and sample number, and each pixel adds up its own. Samples are taken in passes over the whole picture
-/// (1, 3, 12, then 16 each), so that a cancelled render is a picture with fewer samples.
+/// (1, 3, 12, then 16 each), so that a cancelled render is a picture with fewer samples. With a noise threshold, tiles
+/// are judged between passes; a crop window that cuts tiles judges their parts. Only a time limit makes the number of
+/// samples depend on the machine.
 ///
 /// # Errors
 /// When the options describe no picture: see [`RenderError`].
@@ -113,13 +119,16 @@ pub fn render<M: Monitor + ?Sized>(
     let effects = stage.plan().simulated();
     // Chosen once: the rest is compiled for what the scene calls for.
     let job = Job::new(stage, options, &film);
-    let (done, interrupted) = match (effects.contains(EffectSet::TEXTURES), stage.is_filtered()) {
+    let (done, end) = match (effects.contains(EffectSet::TEXTURES), stage.is_filtered()) {
         (false, false) => job.run::<false, false, M>(&mut film, monitor),
         (false, true) => job.run::<false, true, M>(&mut film, monitor),
         (true, false) => job.run::<true, false, M>(&mut film, monitor),
         (true, true) => job.run::<true, true, M>(&mut film, monitor),
     };
     let mut plan = stage.plan().clone();
+    if !matches!(job.method, Method::Path(_)) {
+        plan.leave(EffectSet::INDIRECT_LIGHT);
+    }
     if !job.clip.is_all() {
         plan.ask(EffectSet::CLIPPING, "the section asked for");
     }
@@ -131,9 +140,19 @@ pub fn render<M: Monitor + ?Sized>(
         rays: done.rays,
         samples: done.samples,
         bad_samples: done.bad,
+        noise: Tiles::new(film.window()).most(&film),
         seconds: start.elapsed().as_secs_f64(),
     };
-    Ok(Rendered { film, stats, effects, interrupted })
+    let (interrupted, out_of_time) = (end == End::Cancelled, end == End::OutOfTime);
+    Ok(Rendered { film, stats, effects, interrupted, out_of_time })
+}
+
+/// Why a render ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum End {
+    Done,
+    Cancelled,
+    OutOfTime,
 }
 
 /// What was done, by a band or by all.
@@ -158,7 +177,9 @@ impl Done {
 /// How a camera ray is answered.
 #[derive(Clone, Copy, Debug)]
 enum Method {
-    /// Light, following these lobes.
+    /// All light by paths that follow these lobes.
+    Path(LobeKind),
+    /// Light by Whitted's method, following these lobes.
     Light(LobeKind),
     /// Ambient occlusion within a distance.
     Occlusion(f64),
@@ -176,6 +197,8 @@ struct Job<'a> {
     filter: Filter,
     clip: ClipRegion<f64>,
     method: Method,
+    /// When time is up.
+    deadline: Option<Instant>,
 }
 
 impl<'a> Job<'a> {
@@ -185,14 +208,16 @@ impl<'a> Job<'a> {
         let simulated = stage.plan().simulated();
         let extent = stage.accel.bounds().extent();
         let size = if extent.is_finite() && extent.max_element() > 0.0 { extent.length() } else { 1.0 };
+        let mut follow = LobeKind::empty();
+        follow.set(LobeKind::REFLECTION, simulated.contains(EffectSet::REFLECTION));
+        let through = EffectSet::REFRACTION | EffectSet::TRANSMISSION;
+        follow.set(LobeKind::TRANSMISSION, simulated.intersects(through));
         let method = match options.integrator {
-            IntegratorChoice::Auto | IntegratorChoice::Whitted => {
-                let mut follow = LobeKind::empty();
-                follow.set(LobeKind::REFLECTION, simulated.contains(EffectSet::REFLECTION));
-                let through = EffectSet::REFRACTION | EffectSet::TRANSMISSION;
-                follow.set(LobeKind::TRANSMISSION, simulated.intersects(through));
-                Method::Light(follow)
+            IntegratorChoice::Auto | IntegratorChoice::Path => {
+                follow.set(LobeKind::DIFFUSE, simulated.contains(EffectSet::INDIRECT_LIGHT));
+                Method::Path(follow)
             }
+            IntegratorChoice::Whitted => Method::Light(follow),
             IntegratorChoice::Direct => Method::Light(LobeKind::empty()),
             IntegratorChoice::AmbientOcclusion => Method::Occlusion(0.25 * size),
             IntegratorChoice::Aov(aov) => {
@@ -203,28 +228,35 @@ impl<'a> Job<'a> {
         Self {
             stage,
             options,
-            aovs: film.aovs().to_vec(),
+            aovs: film.sampled().collect(),
             camera,
             cone: Cone { width: cone.width * FOOTPRINT, spread: cone.spread * FOOTPRINT },
-            filter: if stage.reference { Filter::Box } else { Filter::blackman_harris() },
+            filter: match options.filter {
+                FilterChoice::Auto if stage.reference => Filter::Box,
+                FilterChoice::Box => Filter::Box,
+                FilterChoice::Auto | FilterChoice::BlackmanHarris => Filter::blackman_harris(),
+            },
             clip: region(&options.clip),
             method,
+            // A limit beyond all time is none.
+            deadline: options.time_limit.and_then(|limit| Instant::now().checked_add(limit)),
         }
     }
 
-    /// Renders in passes until done or cancelled.
+    /// Renders in passes until done, good enough, cancelled or out of time.
     fn run<const TEXTURES: bool, const FILTERED: bool, M: Monitor + ?Sized>(
         &self,
         film: &mut Film,
         monitor: &M,
-    ) -> (Done, bool) {
+    ) -> (Done, End) {
         let window = film.window();
         let bands = u64::from(window.height.div_ceil(BAND));
         let total = bands * u64::from(self.options.spp);
         let (finished, rays) = (AtomicU64::new(0), AtomicU64::new(0));
+        let mut tiles = Tiles::new(window);
         let mut done = Done::default();
         let mut first = 0;
-        while first < self.options.spp {
+        while first < self.options.spp && tiles.any() {
             let last = match first {
                 0 => 1,
                 1..4 => 4,
@@ -235,7 +267,7 @@ impl<'a> Job<'a> {
                 .par_bands_mut(BAND)
                 .map(|mut band| {
                     let mut tracer = Tracer::<TEXTURES, FILTERED>::new(self.stage, &self.clip);
-                    let band_done = self.band(&mut tracer, &mut band, first..last, monitor);
+                    let band_done = self.band(&mut tracer, &mut band, first..last, &tiles, monitor);
                     let finished = finished.fetch_add(u64::from(last - first), Ordering::Relaxed);
                     let rays = rays.fetch_add(band_done.rays.total(), Ordering::Relaxed) + band_done.rays.total();
                     monitor.progress(finished + u64::from(last - first), total, rays);
@@ -244,11 +276,22 @@ impl<'a> Job<'a> {
                 .reduce(Done::default, Done::and);
             done = done.and(pass);
             if monitor.cancelled() {
-                return (done, true);
+                return (done, End::Cancelled);
             }
             first = last;
+            if let Some(threshold) = self.options.noise_threshold {
+                tiles.judge(film, threshold);
+            }
+            if self.is_late(first) && first < self.options.spp && tiles.any() {
+                return (done, End::OutOfTime);
+            }
         }
-        (done, false)
+        (done, End::Done)
+    }
+
+    /// Whether time is up for samples from this one on; every pixel gets the first.
+    fn is_late(&self, first: u32) -> bool {
+        first > 0 && self.deadline.is_some_and(|end| Instant::now() >= end)
     }
 
     fn band<const TEXTURES: bool, const FILTERED: bool, M: Monitor + ?Sized>(
@@ -256,14 +299,18 @@ impl<'a> Job<'a> {
         tracer: &mut Tracer<'_, TEXTURES, FILTERED>,
         band: &mut Band<'_>,
         samples: std::ops::Range<u32>,
+        tiles: &Tiles,
         monitor: &M,
     ) -> Done {
         let mut done = Done::default();
         for y in band.rows() {
-            if monitor.cancelled() {
+            if monitor.cancelled() || self.is_late(samples.start) {
                 break;
             }
             for x in band.columns() {
+                if !tiles.is_active(x, y) {
+                    continue;
+                }
                 tracer.timed = (x.wrapping_mul(31).wrapping_add(y.wrapping_mul(17))) % TIMED == 0;
                 for sample in samples.clone() {
                     done.bad += u64::from(!self.sample(tracer, band.pixel(x, y), x, y, sample));
@@ -285,16 +332,15 @@ impl<'a> Job<'a> {
         y: u32,
         sample: u32,
     ) -> bool {
-        let sampler = PixelSampler::new(self.options.seed, (x, y), sample);
+        let sampler = PixelSampler::of(self.options.sampler, self.options.seed, (x, y), sample);
         let [dx, dy] = self.filter.offset(sampler.get2(Dimension::Pixel));
         let at = [f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy];
         let ray = self.camera.ray(at);
         let screen = [(at[0] / f64::from(self.options.width)) as f32, (at[1] / f64::from(self.options.height)) as f32];
+        let limits = |follow| Limits { bounces: self.options.max_depth.min(MOST_BOUNCES), follow };
         let mut seen = match self.method {
-            Method::Light(follow) => {
-                let limits = Limits { bounces: self.options.max_depth.min(MOST_BOUNCES), follow };
-                tracer.radiance(ray, self.cone, screen, sampler, limits)
-            }
+            Method::Path(follow) => tracer.path(ray, self.cone, screen, sampler, limits(follow)),
+            Method::Light(follow) => tracer.radiance(ray, self.cone, screen, sampler, limits(follow)),
             Method::Occlusion(reach) => tracer.ambient_occlusion(ray, reach, sampler),
             Method::Values(..) => tracer.values(ray, self.cone),
         };

@@ -1,13 +1,23 @@
 //! Sample points: Owen-scrambled Sobol, a pure function of what they are for.
 //!
 //! Every use of random numbers has its own [`Dimension`], and each dimension is its own two-dimensional Sobol
-//! sequence: its order of samples is shuffled and its points are scrambled by hashes of (seed, pixel, branch,
-//! dimension). So leaving out one effect never changes the numbers that another one sees, and a pixel's points do not
-//! depend on how often, or in which order, numbers were asked for. Within one dimension the points of every aligned
-//! block of 2^k samples keep the stratification of the (0, 2)-sequence.
+//! sequence: its order of samples is shuffled and its points are scrambled by hashes of (seed, branch, dimension). So
+//! leaving out one effect never changes the numbers that another one sees, and a pixel's points do not depend on how
+//! often, or in which order, numbers were asked for. Within one dimension the points of every aligned block of 2^k
+//! samples keep the stratification of the (0, 2)-sequence.
+//!
+//! Pixels differ by a digital shift, which keeps all of that and is itself a sequence along a Morton curve whose order
+//! is shuffled: in each coordinate the points of 2^j samples of an aligned square of 4^k pixels fall one into each of
+//! 2^(j+2k) intervals, for every j and k. Neighbours therefore err in different directions, and the error of a picture
+//! is fine-grained (blue noise) at any number of samples: the aim of Ahmed and Wonka, *Screen-Space Blue-Noise
+//! Diffusion of Monte Carlo Sampling Error via Hierarchical Ordering of Pixels* (2020), without knowing that number
+//! beforehand.
+//!
+//! From the fifth bounce on numbers are independent: nothing is gained by order there.
 //!
 //! Burley, *Practical Hash-based Owen Scrambling*, JCGT 9(4), 2020; the hash that scrambles is Vegdahl's variant of
-//! the Laine-Karras one (*Building a Better LK Hash*, 2021).
+//! the Laine-Karras one (*Building a Better LK Hash*, 2021). The second coordinate is computed as by Ahmed, *An
+//! Implementation Algorithm of 2D Sobol Sequence Fast, Elegant, and Compact* (2024).
 
 /// What a sample is for. The number is the bounce: 0 at the camera's first hit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -30,7 +40,34 @@ pub enum Dimension {
     Color,
 }
 
+/// Where sample points come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SamplerChoice {
+    /// Owen-scrambled Sobol points, spread over the picture.
+    #[default]
+    Sobol,
+    /// Independent random numbers, by a PCG hash: for comparison.
+    Independent,
+}
+
+impl SamplerChoice {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::Sobol, Self::Independent];
+
+    /// The name used on command lines.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Sobol => "sobol",
+            Self::Independent => "independent",
+        }
+    }
+}
+
 impl Dimension {
+    /// Dimensions from here on are not ordered: bounce 4 and later.
+    const INDEPENDENT: u32 = 1 + 8 * 4;
+
     /// Each pair of purpose and bounce has one number, forever.
     const fn index(self) -> u32 {
         const PURPOSES: u32 = 8;
@@ -59,8 +96,13 @@ impl Dimension {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PixelSampler {
+    /// Of the seed and the branch.
     key: u32,
+    /// The sample's number with its bits reversed: the van der Corput point.
     sample: u32,
+    /// The pixel's place on a Morton curve, bits reversed.
+    place: u32,
+    independent: bool,
 }
 
 impl PixelSampler {
@@ -68,26 +110,40 @@ impl PixelSampler {
     #[inline]
     #[must_use]
     pub fn new(seed: u64, pixel: (u32, u32), sample: u32) -> Self {
-        let key = [seed as u32, (seed >> 32) as u32, pixel.0, pixel.1].into_iter().fold(0x9e37_79b9, combine);
-        Self { key, sample }
+        Self::of(SamplerChoice::Sobol, seed, pixel, sample)
+    }
+
+    /// The same from another source of points.
+    #[inline]
+    #[must_use]
+    pub fn of(choice: SamplerChoice, seed: u64, pixel: (u32, u32), sample: u32) -> Self {
+        // A Morton curve of 32 bits covers 65536 x 65536 pixels; squares of that size have keys of their own.
+        let square = (pixel.0 >> 16) | (pixel.1 & 0xffff_0000);
+        let key = [seed as u32, (seed >> 32) as u32, square].into_iter().fold(0x9e37_79b9, combine);
+        let place = (spread(pixel.0) | spread(pixel.1) << 1).reverse_bits();
+        Self { key, sample: sample.reverse_bits(), place, independent: choice == SamplerChoice::Independent }
     }
 
     /// Points for one of several branches of a path, or one of several lights: independent of all other branches'.
     #[inline]
     #[must_use]
     pub fn branch(self, branch: u32) -> Self {
-        Self { key: combine(self.key ^ 0x5bd1_e995, branch), sample: self.sample }
+        Self { key: combine(self.key ^ 0x5bd1_e995, branch), ..self }
     }
 
     /// A point in the unit square, each coordinate in [0, 1).
     #[inline]
     #[must_use]
     pub fn get2(&self, dimension: Dimension) -> [f32; 2] {
-        let key = combine(self.key, dimension.index());
-        let index = owen_scramble(self.sample, key);
+        let dimension = dimension.index();
+        if self.independent || dimension >= Dimension::INDEPENDENT {
+            return self.random(dimension);
+        }
+        let key = combine(self.key, dimension);
+        let first = laine_karras(self.sample, key);
         [
-            to_unit(owen_scramble(index.reverse_bits(), combine(key, 1))),
-            to_unit(owen_scramble(sobol_second(index), combine(key, 2))),
+            to_unit(owen_scramble(first ^ self.shift(combine(key, 3)), combine(key, 1))),
+            to_unit(owen_scramble(sobol_second(first) ^ self.shift(combine(key, 4)), combine(key, 2))),
         ]
     }
 
@@ -95,10 +151,53 @@ impl PixelSampler {
     #[inline]
     #[must_use]
     pub fn get1(&self, dimension: Dimension) -> f32 {
-        let key = combine(self.key, dimension.index());
-        let index = owen_scramble(self.sample, key);
-        to_unit(owen_scramble(index.reverse_bits(), combine(key, 1)))
+        let dimension = dimension.index();
+        if self.independent || dimension >= Dimension::INDEPENDENT {
+            return self.random(dimension)[0];
+        }
+        let key = combine(self.key, dimension);
+        let first = laine_karras(self.sample, key);
+        to_unit(owen_scramble(first ^ self.shift(combine(key, 3)), combine(key, 1)))
     }
+
+    /// What tells this pixel's points from those of other pixels. Level r of the shift is the sum of C(r, c) m_c over
+    /// the bits of the place m from the lowest: any k successive rows of the first k columns of that matrix have
+    /// determinant 1, so whatever levels the samples of a pixel have filled, the next k tell 2^k pixels apart.
+    #[inline]
+    fn shift(&self, key: u32) -> u32 {
+        let mut x = laine_karras(self.place, key);
+        x ^= (x >> 1) & 0x5555_5555;
+        x ^= (x >> 2) & 0x3333_3333;
+        x ^= (x >> 4) & 0x0f0f_0f0f;
+        x ^= (x >> 8) & 0x00ff_00ff;
+        x ^ (x >> 16)
+    }
+
+    /// Independent numbers: the PCG hash of four words of Jarzynski and Olano, *Hash Functions for GPU Rendering*,
+    /// JCGT 9(3), 2020.
+    #[inline]
+    fn random(&self, dimension: u32) -> [f32; 2] {
+        let pcg = |x: u32| x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let [mut x, mut y, mut z, mut w] = [self.place, self.sample, dimension, self.key].map(pcg);
+        for _ in 0..2 {
+            x = x.wrapping_add(y.wrapping_mul(w));
+            y = y.wrapping_add(z.wrapping_mul(x));
+            z = z.wrapping_add(x.wrapping_mul(y));
+            w = w.wrapping_add(y.wrapping_mul(z));
+            [x, y, z, w] = [x, y, z, w].map(|v| v ^ (v >> 16));
+        }
+        [to_unit(x), to_unit(y)]
+    }
+}
+
+/// The lower 16 bits with gaps between them.
+#[inline]
+fn spread(x: u32) -> u32 {
+    let mut x = x & 0xffff;
+    x = (x | x << 8) & 0x00ff_00ff;
+    x = (x | x << 4) & 0x0f0f_0f0f;
+    x = (x | x << 2) & 0x3333_3333;
+    (x | x << 1) & 0x5555_5555
 }
 
 /// A hash with full avalanche (Chris Wellons, *Prospecting for Hash Functions*: `lowbias32`).
@@ -115,30 +214,32 @@ fn combine(key: u32, value: u32) -> u32 {
     hash(key.rotate_left(5) ^ hash(value.wrapping_add(0x9e37_79b9)))
 }
 
-/// Nested uniform (Owen) scrambling in base 2: every bit is flipped by a hash of the bits above it.
+/// Every bit is flipped by a hash of the bits below it.
 #[inline]
-fn owen_scramble(x: u32, key: u32) -> u32 {
-    let mut x = x.reverse_bits();
+fn laine_karras(mut x: u32, key: u32) -> u32 {
     x ^= x.wrapping_mul(0x3d20_adea);
     x = x.wrapping_add(key);
     x = x.wrapping_mul((key >> 16) | 1);
     x ^= x.wrapping_mul(0x0552_6c56);
-    x ^= x.wrapping_mul(0x53a2_2864);
-    x.reverse_bits()
+    x ^ x.wrapping_mul(0x53a2_2864)
 }
 
-/// The second dimension of the Sobol sequence: its generator matrix is Pascal's triangle modulo 2.
+/// Nested uniform (Owen) scrambling in base 2: every bit is flipped by a hash of the bits above it.
 #[inline]
-fn sobol_second(index: u32) -> u32 {
-    let (mut index, mut column, mut point) = (index, 1 << 31, 0);
-    while index != 0 {
-        if index & 1 != 0 {
-            point ^= column;
-        }
-        column ^= column >> 1;
-        index >>= 1;
-    }
-    point
+fn owen_scramble(x: u32, key: u32) -> u32 {
+    laine_karras(x.reverse_bits(), key).reverse_bits()
+}
+
+/// The second coordinate of the Sobol point whose first is given: its generator matrix is Pascal's triangle modulo 2,
+/// whose entry C(c, r) is odd where the bits of r are among those of c.
+#[inline]
+fn sobol_second(first: u32) -> u32 {
+    let mut x = first;
+    x ^= (x & 0x5555_5555) << 1;
+    x ^= (x & 0x3333_3333) << 2;
+    x ^= (x & 0x0f0f_0f0f) << 4;
+    x ^= (x & 0x00ff_00ff) << 8;
+    x ^ (x << 16)
 }
 
 /// The upper 24 bits as a number in [0, 1): all of them are exact in f32.
@@ -233,12 +334,88 @@ mod tests {
                 centred(PixelSampler::new(0, (s % 64 + 1, s / 64), 0), d),
             )
         });
-        assert!(neighbours.abs() < bound, "neighbouring pixels: {neighbours}");
+        assert!(neighbours < -0.1, "neighbouring pixels differ more than by chance: {neighbours}");
+        let distant = correlation(&|s| {
+            (
+                centred(PixelSampler::new(0, (s % 64, s / 64), 0), d),
+                centred(PixelSampler::new(0, (s % 64 + 640, s / 64 + 1280), 0), d),
+            )
+        });
+        assert!(distant.abs() < bound, "distant pixels: {distant}");
         let branches = correlation(&|s| {
             let p = PixelSampler::new(0, (5, 6), s);
             (centred(p.branch(0), d), centred(p.branch(1), d))
         });
         assert!(branches.abs() < bound, "branches: {branches}");
+    }
+
+    /// The definition by columns.
+    fn second_by_columns(mut index: u32) -> u32 {
+        let (mut column, mut point) = (1_u32 << 31, 0);
+        while index != 0 {
+            if index & 1 != 0 {
+                point ^= column;
+            }
+            column ^= column >> 1;
+            index >>= 1;
+        }
+        point
+    }
+
+    #[test]
+    fn the_second_coordinate_is_that_of_the_sobol_sequence() {
+        for i in (0..1000).chain([u32::MAX, 1 << 31, 0x1234_5678]) {
+            assert_eq!(sobol_second(i.reverse_bits()), second_by_columns(i), "{i}");
+        }
+    }
+
+    /// In each coordinate, the points of any 2^j first samples in any aligned square of 4^k pixels.
+    #[test]
+    fn squares_of_pixels_are_stratified_together() {
+        for dimension in [Dimension::Pixel, Dimension::LightPosition(0), Dimension::Direction(2)] {
+            for (j, k, corner) in [(0, 1, (4, 6)), (0, 3, (16, 8)), (2, 1, (0, 2)), (4, 2, (64, 128)), (6, 1, (10, 12))]
+            {
+                let (side, samples) = (1_u32 << k, 1_u32 << j);
+                let intervals = (samples * side * side) as usize;
+                let mut seen = vec![[0; 2]; intervals];
+                for i in 0..side * side {
+                    let pixel = (corner.0 + i % side, corner.1 + i / side);
+                    for s in 0..samples {
+                        let p = PixelSampler::new(3, pixel, s).get2(dimension);
+                        for (c, x) in p.iter().enumerate() {
+                            seen[(x * intervals as f32) as usize][c] += 1;
+                        }
+                    }
+                }
+                assert!(seen.iter().flatten().all(|n| *n == 1), "{dimension:?} {samples} samples, {side} x {side}");
+            }
+        }
+    }
+
+    /// Means over squares of 8 x 8 pixels of one sample each of a function of two dimensions, which no net covers: no
+    /// worse than by chance; of one dimension: far better.
+    #[test]
+    fn the_error_of_a_picture_is_fine_grained() {
+        let spread = |choice: SamplerChoice, f: &dyn Fn(PixelSampler) -> f32| {
+            let mut sum = 0.0;
+            for block in 0..256_u32 {
+                let mean = (0..64)
+                    .map(|i| {
+                        let pixel = (block % 16 * 8 + i % 8, block / 16 * 8 + i / 8);
+                        f64::from(f(PixelSampler::of(choice, 0, pixel, 0)))
+                    })
+                    .sum::<f64>()
+                    / 64.0;
+                sum += (mean - 0.5).powi(2) / 256.0;
+            }
+            sum
+        };
+        let one = |p: PixelSampler| p.get1(Dimension::LightPosition(0));
+        let two = |p: PixelSampler| f32::from(u8::from(p.get1(Dimension::Direction(0)) < p.get1(Dimension::Lobe(0))));
+        let [sobol, independent] = SamplerChoice::ALL.map(|c| spread(c, &one));
+        assert!(sobol < 0.01 * independent, "{sobol} against {independent}");
+        let [sobol, independent] = SamplerChoice::ALL.map(|c| spread(c, &two));
+        assert!(sobol < 1.5 * independent, "{sobol} against {independent}");
     }
 
     #[test]

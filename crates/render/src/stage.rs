@@ -9,7 +9,8 @@ use glam::Vec3;
 
 use crate::camera::{Camera, CameraError};
 use crate::light::Lights;
-use crate::light::area::{AreaLights, ShapeLight};
+use crate::light::area::{AreaLights, Glow, ShapeLight};
+use crate::light::choice::LightChoice;
 use crate::light::environment::EnvironmentError;
 use crate::light::punctual::PunctualLight;
 use crate::material::{Conventions, Material, Textures};
@@ -187,7 +188,10 @@ impl Stage {
             AreaLights::new(
                 lights,
                 &world,
-                |id| Some(of(id)).filter(|m| m.glows()).map(Material::glows_on_both_sides),
+                |id| {
+                    let glow = |m: &Material| Glow { both_sides: m.glows_on_both_sides(), even: m.glows_evenly() };
+                    Some(of(id)).filter(|m| m.glows()).map(glow)
+                },
                 |id, u, v| {
                     let hit = firsthit_accel::Hit { id, t: 0.0, u, v, normal: glam::DVec3::Z };
                     of(id).emission::<true>(&world.attributes(&hit, true))
@@ -202,10 +206,12 @@ impl Stage {
                 area.unsampled
             ));
         }
+        let environment = environment.filter(|e| effects.contains(EffectSet::ENVIRONMENT) && !e.is_black());
         let lights = Lights {
+            choice: LightChoice::new(&punctual, &area, environment.as_ref(), studio),
             punctual,
             area,
-            environment: environment.filter(|e| effects.contains(EffectSet::ENVIRONMENT) && !e.is_black()),
+            environment,
             sample_environment,
             ambient: if headlight.is_some() { survey::AMBIENT } else { Vec3::ZERO },
             ambient_reach: view.map_or(0.0, |v| 0.5 * v.distance),

@@ -16,6 +16,8 @@ pub enum RayKind {
     ShadowEnvironment,
     /// Mirrored or glossy.
     Reflection,
+    /// From a surface that scatters evenly, to find the light that surfaces send to each other.
+    Indirect,
     /// Into or out of a solid.
     Refraction,
     /// Through a thin transmissive surface.
@@ -28,12 +30,13 @@ pub enum RayKind {
 
 impl RayKind {
     /// All kinds, in the order of reports.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Camera,
         Self::ShadowPunctual,
         Self::ShadowArea,
         Self::ShadowEnvironment,
         Self::Reflection,
+        Self::Indirect,
         Self::Refraction,
         Self::Transmission,
         Self::Transparency,
@@ -47,6 +50,7 @@ impl RayKind {
             Self::Camera => "camera",
             Self::ShadowPunctual | Self::ShadowArea | Self::ShadowEnvironment => "shadow",
             Self::Reflection => "reflection",
+            Self::Indirect => "indirect",
             Self::Refraction => "refraction",
             Self::Transmission => "transmission",
             Self::Transparency => "transparency",
@@ -117,6 +121,9 @@ pub struct RenderStats {
     /// Samples whose radiance was not finite or negative, and was dropped to black. Always 0 unless something is
     /// wrong with the scene's numbers.
     pub bad_samples: u64,
+    /// The estimated noise of the noisiest tile, as of
+    /// [`RenderOptions::noise_threshold`](crate::RenderOptions::noise_threshold); `None` below 32 samples.
+    pub noise: Option<f32>,
     /// Wall-clock seconds.
     pub seconds: f64,
 }
@@ -133,7 +140,7 @@ mod tests {
         counts += counts;
         assert_eq!(counts.shadow(), 10);
         assert_eq!(counts.by_name()[1], ("shadow", 10));
-        assert_eq!(counts.by_name().len(), 7);
+        assert_eq!(counts.by_name().len(), 8);
         assert_eq!(counts.total(), 10);
     }
 }

@@ -69,14 +69,21 @@ pub(crate) fn call_for_materials(plan: &mut EffectPlan, scene: &SceneDesc) {
 fn effects_of(model: &MaterialModel) -> EffectSet {
     match model {
         MaterialModel::Pbr(pbr) => effects_of_pbr(pbr),
-        MaterialModel::Diffuse { .. } => EffectSet::empty(),
-        MaterialModel::Mirror { .. } | MaterialModel::RoughMirror { .. } => EffectSet::REFLECTION,
-        MaterialModel::Glass { .. } | MaterialModel::RoughGlass { .. } => EffectSet::REFLECTION | EffectSet::REFRACTION,
+        MaterialModel::Diffuse { .. } => EffectSet::INDIRECT_LIGHT,
+        MaterialModel::Mirror { .. } => EffectSet::REFLECTION,
+        MaterialModel::RoughMirror { alpha, .. } => EffectSet::REFLECTION | even(*alpha),
+        MaterialModel::Glass { .. } => EffectSet::REFLECTION | EffectSet::REFRACTION,
+        MaterialModel::RoughGlass { alpha, .. } => EffectSet::REFLECTION | EffectSet::REFRACTION | even(*alpha),
         MaterialModel::Emission { radiance } if radiance.max_element() > 0.0 => {
             EffectSet::EMISSION | EffectSet::AREA_LIGHTS
         }
         MaterialModel::Emission { .. } => EffectSet::empty(),
     }
+}
+
+/// What is so rough reflects about evenly.
+fn even(alpha: f32) -> EffectSet {
+    if alpha > ROUGHEST_FOLLOWED { EffectSet::INDIRECT_LIGHT } else { EffectSet::empty() }
 }
 
 fn effects_of_pbr(m: &PbrMaterial) -> EffectSet {
@@ -110,6 +117,9 @@ fn effects_of_pbr(m: &PbrMaterial) -> EffectSet {
         set |= EffectSet::EMISSION | EffectSet::AREA_LIGHTS;
     }
     let smooth = m.roughness_texture.is_some() || m.roughness * m.roughness <= ROUGHEST_FOLLOWED;
+    // Pure and smooth metals without anything over them mirror, and do nothing else.
+    let mirror = m.metallic >= 1.0 && m.metallic_texture.is_none() && smooth && m.roughness_texture.is_none();
+    set.set(EffectSet::INDIRECT_LIGHT, !mirror || m.clearcoat.is_some() || m.sheen.is_some());
     let coated = m.specular > 0.0 && m.ior != 1.0 && smooth;
     let mirrors = EffectSet::CLEARCOAT | EffectSet::IRIDESCENCE;
     set.set(EffectSet::REFLECTION, m.metallic > 0.0 || coated || over.intersects(mirrors));

@@ -73,7 +73,7 @@ pub(crate) fn render_scene(scene: &SceneDesc, stage_options: &StageOptions, opti
     render(&stage(&Arc::new(scene.clone()), stage_options), options, &()).unwrap()
 }
 
-/// Looks at one point of a scene through a very narrow camera.
+/// Looks at one point of a scene through a very narrow camera, by Whitted's method if nothing else is asked for.
 pub(crate) struct Probe<'a> {
     scene: &'a SceneDesc,
     eye: DVec3,
@@ -83,7 +83,9 @@ pub(crate) struct Probe<'a> {
 
 impl<'a> Probe<'a> {
     pub(crate) fn new(scene: &'a SceneDesc) -> Self {
-        let options = RenderOptions { width: 1, height: 1, spp: 64, ..RenderOptions::default() };
+        let integrator = IntegratorChoice::Whitted;
+        let options =
+            RenderOptions { width: 1, height: 1, spp: 64, max_depth: 8, integrator, ..RenderOptions::default() };
         Self { scene, eye: DVec3::ZERO, stage: StageOptions::default(), options }
     }
 
@@ -94,6 +96,11 @@ impl<'a> Probe<'a> {
 
     pub(crate) fn spp(mut self, spp: u32) -> Self {
         self.options.spp = spp;
+        self
+    }
+
+    pub(crate) fn depth(mut self, bounces: u32) -> Self {
+        self.options.max_depth = bounces;
         self
     }
 

@@ -2,6 +2,7 @@
 
 mod common;
 mod layers;
+mod path;
 mod references;
 
 use std::f64::consts::PI;
@@ -421,7 +422,11 @@ fn everything() -> SceneDesc {
 }
 
 pub(crate) fn small(spp: u32) -> RenderOptions {
-    RenderOptions { width: 48, height: 32, spp, seed: 5, ..RenderOptions::default() }
+    RenderOptions { width: 48, height: 32, spp, seed: 5, max_depth: 8, ..RenderOptions::default() }
+}
+
+fn whitted(spp: u32) -> RenderOptions {
+    RenderOptions { integrator: IntegratorChoice::Whitted, ..small(spp) }
 }
 
 pub(crate) fn bits(rendered: &Rendered) -> Vec<[u32; 4]> {
@@ -431,14 +436,17 @@ pub(crate) fn bits(rendered: &Rendered) -> Vec<[u32; 4]> {
 #[test]
 fn any_number_of_threads_gives_the_same_bits() {
     let scene = everything();
-    let with = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| common::render_scene(&scene, &StageOptions::default(), &small(4)))
-    };
-    let (one, two, three) = (with(1), with(2), with(3));
-    assert_eq!(bits(&one), bits(&two));
-    assert_eq!(bits(&one), bits(&three));
-    assert_eq!(one.stats.rays, two.stats.rays);
+    for options in [small(4), whitted(4)] {
+        let with = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| common::render_scene(&scene, &StageOptions::default(), &options))
+        };
+        let (one, two, three) = (with(1), with(2), with(3));
+        assert_eq!(bits(&one), bits(&two));
+        assert_eq!(bits(&one), bits(&three));
+        assert_eq!(one.stats.rays, two.stats.rays);
+    }
+    let one = common::render_scene(&scene, &StageOptions::default(), &small(4));
     let other = common::render_scene(&scene, &StageOptions::default(), &RenderOptions { seed: 6, ..small(4) });
     assert_ne!(bits(&one), bits(&other));
 }
@@ -468,16 +476,17 @@ fn no_ray_is_cast_for_an_effect_that_nothing_calls_for() {
     let (mut scene, _) = floor(diffuse(0.5));
     scene.lights.push(light(LightKind::Point { position: DVec3::Y, intensity: Vec3::ONE, range: None }));
     scene.settings.reference_conventions = true;
-    let rendered = common::render_scene(&scene, &StageOptions::default(), &small(2));
+    let rendered = common::render_scene(&scene, &StageOptions::default(), &whitted(2));
     for kind in RayKind::ALL {
         let called = matches!(kind, RayKind::Camera | RayKind::ShadowPunctual);
         assert_eq!(rendered.stats.rays[kind] > 0, called, "{kind:?}");
     }
     for entry in &rendered.effects.entries {
-        let called = EffectSet::SHADOWS | EffectSet::PUNCTUAL_LIGHTS;
+        let called = EffectSet::SHADOWS | EffectSet::PUNCTUAL_LIGHTS | EffectSet::INDIRECT_LIGHT;
         assert_eq!(entry.called_for, called.contains(entry.effect), "{}", entry.name);
-        assert_eq!(entry.simulated, entry.called_for);
-        assert!(entry.called_for || entry.rays.is_none_or(|r| r == 0), "{}", entry.name);
+        let simulated = called - EffectSet::INDIRECT_LIGHT;
+        assert_eq!(entry.simulated, simulated.contains(entry.effect), "{}", entry.name);
+        assert!(entry.simulated || entry.rays.is_none_or(|r| r == 0), "{}", entry.name);
     }
     assert_eq!(rendered.effects.entries[1].by, ["1 point light"]);
 }
@@ -487,11 +496,11 @@ fn effects_that_are_taken_away_cast_no_rays() {
     let scene = everything();
     let without = |remove| {
         let effects = EffectOverrides { remove, ..EffectOverrides::default() };
-        common::render_scene(&scene, &StageOptions { effects, ..StageOptions::default() }, &small(1)).stats.rays
+        common::render_scene(&scene, &StageOptions { effects, ..StageOptions::default() }, &whitted(1)).stats.rays
     };
     let all = without(EffectSet::empty());
     for kind in RayKind::ALL {
-        let not_here = matches!(kind, RayKind::Transmission | RayKind::AmbientOcclusion);
+        let not_here = matches!(kind, RayKind::Transmission | RayKind::AmbientOcclusion | RayKind::Indirect);
         assert_eq!(all[kind] > 0, !not_here, "{kind:?}");
     }
     assert_eq!(without(EffectSet::SHADOWS).shadow(), 0);
@@ -513,10 +522,12 @@ fn the_specialised_kernel_gives_the_bits_of_the_full_one() {
             effects: EffectOverrides { add: EffectSet::all(), ..EffectOverrides::default() },
             ..StageOptions::default()
         };
-        let a = common::render_scene(&scene, &StageOptions::default(), &small(4));
-        let b = common::render_scene(&scene, &full, &small(4));
-        assert_eq!(bits(&a), bits(&b));
-        assert_eq!(a.stats.rays, b.stats.rays);
+        for options in [small(4), whitted(4)] {
+            let a = common::render_scene(&scene, &StageOptions::default(), &options);
+            let b = common::render_scene(&scene, &full, &options);
+            assert_eq!(bits(&a), bits(&b));
+            assert_eq!(a.stats.rays, b.stats.rays);
+        }
     }
 }
 
@@ -540,7 +551,7 @@ fn a_scene_at_ten_million_looks_as_at_the_origin() {
         let mut stage = StageOptions::default();
         stage.camera_changes.position = Some(DVec3::new(0.5, 1.0, 5.0) + shift);
         stage.camera_changes.focal_point = Some(shift);
-        common::render_scene(scene, &stage, &small(4)).film.color().pixels
+        common::render_scene(scene, &stage, &whitted(4)).film.color().pixels
     };
     let (a, b) = (from(&near, DVec3::ZERO), from(&far, far_by));
     let mut different = 0;

@@ -1,4 +1,7 @@
-//! Against the reference images, where Whitted's ray tracing gives the whole answer.
+//! Against the reference images: path tracing in everything, Whitted's ray tracing where it gives the whole answer.
+//!
+//! Path tracing is compared in every scene there is: the mean to 1 per cent, every block of 8 x 8 pixels to 1 per cent
+//! and three standard deviations (of our own variance and of the reference's noise). Of Whitted's:
 //!
 //! | scene | compared | why the rest is not |
 //! |---|---|---|
@@ -12,8 +15,11 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use exr::prelude::{ReadChannels, ReadLayers};
-use firsthit_render::{RenderOptions, StageOptions, render};
-use glam::Vec3;
+use firsthit_render::{
+    Aov, EnvironmentChoice, FilterChoice, IntegratorChoice, RenderOptions, Rendered, StageOptions, TextureFilter,
+    render,
+};
+use glam::{DVec3, Vec3};
 
 const SIDE: usize = 256;
 const BLOCK: usize = 8;
@@ -45,8 +51,18 @@ fn reference(name: &str) -> Vec<Vec3> {
     image.layer_data.channel_data.pixels
 }
 
-/// The scene as its file says; of paths without end, `END` bounces.
+/// By Whitted's method.
 fn picture(name: &str, spp: u32) -> Vec<Vec3> {
+    let options = RenderOptions { spp, integrator: IntegratorChoice::Whitted, ..RenderOptions::default() };
+    colors(&rendered(name, options))
+}
+
+fn colors(rendered: &Rendered) -> Vec<Vec3> {
+    rendered.film.color().pixels.iter().map(|p| Vec3::new(p[0], p[1], p[2])).collect()
+}
+
+/// The scene as its file says; of paths without end, `END` bounces.
+fn rendered(name: &str, options: RenderOptions) -> Rendered {
     let imported =
         firsthit_import::open(folder(name).join("scene.json"), &firsthit_import::Options::default()).unwrap();
     let settings = &imported.scene.settings;
@@ -54,13 +70,131 @@ fn picture(name: &str, spp: u32) -> Vec<Vec3> {
     assert_eq!(settings.resolution, Some((SIDE as u32, SIDE as u32)));
     let bounces = settings.max_path_edges.map_or(END, |edges| edges.saturating_sub(1).min(END));
     let scene = Arc::new(imported.scene);
-    let options = StageOptions { aspect: 1.0, ..StageOptions::default() };
-    let stage = super::common::stage(&scene, &options);
-    let options =
-        RenderOptions { width: SIDE as u32, height: SIDE as u32, spp, max_depth: bounces, ..RenderOptions::default() };
+    let as_square = StageOptions { aspect: 1.0, ..StageOptions::default() };
+    let stage = super::common::stage(&scene, &as_square);
+    let options = RenderOptions { width: SIDE as u32, height: SIDE as u32, max_depth: bounces, ..options };
     let rendered = render(&stage, &options, &()).unwrap();
     assert_eq!(rendered.stats.bad_samples, 0);
-    rendered.film.color().pixels.iter().map(|p| Vec3::new(p[0], p[1], p[2])).collect()
+    rendered
+}
+
+/// How a picture by path tracing differs from the reference.
+#[derive(Debug)]
+struct Difference {
+    /// Of each colour: our mean over theirs.
+    ratio: [f32; 3],
+    /// Share of blocks beyond what is allowed.
+    beyond: f32,
+}
+
+fn difference(name: &str, spp: u32) -> Difference {
+    let options = RenderOptions { spp, aovs: vec![Aov::Variance], ..RenderOptions::default() };
+    compared(name, &rendered(name, options))
+}
+
+fn compared(name: &str, rendered: &Rendered) -> Difference {
+    let (ours, theirs) = (colors(rendered), reference(name));
+    let variance = rendered.film.aov(Aov::Variance).unwrap().pixels;
+    let noise: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(folder(name).join("ref.json")).unwrap()).unwrap();
+    let noise = noise["ref_noise_mse"].as_f64().unwrap();
+    let sum = |p: &[Vec3]| p.iter().map(|p| p.as_dvec3()).sum::<glam::DVec3>();
+    let (all, expected) = (sum(&ours), sum(&theirs));
+    let all_variance: f64 =
+        variance.iter().map(|v| f64::from(v[0] + v[1] + v[2]) / 3.0).sum::<f64>() / ours.len() as f64;
+    let mut beyond = 0;
+    for by in 0..SIDE / BLOCK {
+        for bx in 0..SIDE / BLOCK {
+            let (mut ours_sum, mut theirs_sum, mut var) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
+            for i in 0..BLOCK * BLOCK {
+                let at = (by * BLOCK + i / BLOCK) * SIDE + bx * BLOCK + i % BLOCK;
+                ours_sum += ours[at];
+                theirs_sum += theirs[at];
+                var += Vec3::new(variance[at][0], variance[at][1], variance[at][2]);
+            }
+            let n = (BLOCK * BLOCK) as f32;
+            // The reference's noise, spread as ours is.
+            let var = var * (1.0 + (noise / all_variance.max(1e-12)) as f32);
+            let allowed = 0.01 * theirs_sum / n + 3.0 * var.map(f32::sqrt) / n + 1e-5;
+            beyond += usize::from((ours_sum / n - theirs_sum / n).abs().cmpgt(allowed).any());
+        }
+    }
+    let blocks = (SIDE / BLOCK).pow(2) as f32;
+    let ratio = std::array::from_fn(|c| if expected[c] > 0.0 { (all[c] / expected[c]) as f32 } else { 1.0 });
+    Difference { ratio, beyond: beyond as f32 / blocks }
+}
+
+#[test]
+fn path_tracing_agrees_with_every_reference() {
+    let base = folder("");
+    let mut names: Vec<String> = std::fs::read_dir(&base)
+        .unwrap()
+        .map(|entry| entry.unwrap())
+        .filter(|entry| entry.path().join("scene.json").exists())
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    assert!(names.len() >= 5, "{names:?}");
+    for name in names {
+        let found = difference(&name, 64);
+        println!("{name}: {found:?}");
+        assert!(found.ratio.iter().all(|r| (r - 1.0).abs() < 0.01), "{name}: {found:?}");
+        // Three standard deviations of each of three colours of 1024 blocks: a few by chance.
+        assert!(found.beyond <= 0.01, "{name}: {found:?}");
+    }
+}
+
+/// The glTF files of scenes named `gltf_*`, read as any glTF file is: light and camera of the scene, and the switches
+/// that make it the core of the specification.
+#[test]
+fn gltf_files_by_themselves_agree_with_their_references() {
+    for entry in std::fs::read_dir(folder("")).unwrap().map(|e| e.unwrap()) {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        let Ok(text) = std::fs::read(entry.path().join("scene.json")) else { continue };
+        if !name.starts_with("gltf_") {
+            continue;
+        }
+        let json: serde_json::Value = serde_json::from_slice(&text).unwrap();
+        let vector = |v: &serde_json::Value| DVec3::from_array([0, 1, 2].map(|i| v[i].as_f64().unwrap()));
+        let file = entry.path().join(json["objects"][0]["file"].as_str().unwrap());
+        let scene = Arc::new(firsthit_import::open(file, &firsthit_import::Options::default()).unwrap().scene);
+        let mut stage = StageOptions {
+            aspect: 1.0,
+            environment: EnvironmentChoice::White,
+            energy_compensation: false,
+            shadow_terminator: false,
+            texture_filter: TextureFilter::Bilinear,
+            ..StageOptions::default()
+        };
+        let camera = &json["camera"];
+        stage.camera_changes.position = Some(vector(&camera["origin"]));
+        stage.camera_changes.focal_point = Some(vector(&camera["target"]));
+        stage.camera_changes.view_up = Some(vector(&camera["up"]));
+        stage.camera_changes.view_angle = Some(camera["vfov_deg"].as_f64().unwrap().to_radians());
+        let options = RenderOptions {
+            width: SIDE as u32,
+            height: SIDE as u32,
+            spp: 64,
+            max_depth: END,
+            filter: FilterChoice::Box,
+            aovs: vec![Aov::Variance],
+            ..RenderOptions::default()
+        };
+        let found = compared(&name, &render(&super::common::stage(&scene, &stage), &options, &()).unwrap());
+        println!("{name} by its glTF file: {found:?}");
+        assert!(found.ratio.iter().all(|r| (r - 1.0).abs() < 0.01) && found.beyond <= 0.01, "{name}: {found:?}");
+    }
+}
+
+/// At each pixel.
+#[test]
+fn in_a_white_furnace_path_tracing_sees_nothing() {
+    for name in ["furnace_diffuse", "furnace_glass"] {
+        let options = RenderOptions { spp: 16, ..RenderOptions::default() };
+        for (i, p) in colors(&rendered(name, options)).iter().enumerate() {
+            assert!((*p - Vec3::ONE).abs().max_element() < 5e-3, "{name}, pixel {i}: {p}");
+        }
+    }
 }
 
 /// Means of blocks of 8 x 8 pixels, and the standard deviation of such a mean, estimated from its pixels.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use firsthit_accel::{BuildOptions, SceneBuilder};
 use firsthit_geometry::Precision;
 use firsthit_import::SceneDesc;
-use firsthit_render::{Monitor, RenderOptions, Stage, StageOptions, View, film::Picture, render};
+use firsthit_render::{IntegratorChoice, Monitor, RenderOptions, Stage, StageOptions, View, film::Picture, render};
 
 use super::{PIXELS_PER_DEGREE, PictureError, different_pixels, flip, rmse};
 use crate::result::PictureRow;
@@ -33,7 +33,15 @@ impl Default for PictureOptions {
     fn default() -> Self {
         Self {
             tiers: Precision::ALL.to_vec(),
-            render: RenderOptions { width: 640, height: 360, spp: 4, ..RenderOptions::default() },
+            // Whitted's method: tiers are to differ by what rays meet, not by noise.
+            render: RenderOptions {
+                width: 640,
+                height: 360,
+                spp: 4,
+                max_depth: 8,
+                integrator: IntegratorChoice::Whitted,
+                ..RenderOptions::default()
+            },
             stage: StageOptions::default(),
             view: View::default(),
             pixels_per_degree: PIXELS_PER_DEGREE,

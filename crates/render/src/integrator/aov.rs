@@ -57,6 +57,7 @@ impl First {
             Aov::MaterialId => distinct(self.material),
             Aov::PrimitiveId => distinct(self.primitive ^ self.geometry.wrapping_mul(0x9e37_79b9)),
             Aov::Heat => heat(cost),
+            Aov::Samples | Aov::Variance => Vec3::ZERO,
         }
     }
 

@@ -2,6 +2,7 @@
 //!
 //! | module | answers |
 //! |---|---|
+//! | [`path`] | all light: of lights, and by any number of surfaces |
 //! | [`whitted`] | light of all lights, mirrored, refracted and let through; with nothing followed, direct light alone |
 //! | [`direct`] | the light that reaches one point from all lights |
 //! | [`ao`] | how much of the hemisphere over a point is free |
@@ -14,6 +15,8 @@
 pub(crate) mod ao;
 pub(crate) mod aov;
 mod direct;
+pub(crate) mod path;
+mod scatter;
 mod tracer;
 pub(crate) mod whitted;
 

@@ -38,6 +38,27 @@ impl Timing {
     }
 }
 
+/// A shadow ray.
+fn towards(from: DVec3, sample: &LightSample) -> Ray<f64> {
+    /// The light itself is not in the way.
+    const BEFORE_LIGHT: f64 = 1.0 - 1e-6;
+    match sample.end {
+        LightEnd::At(point) => Ray::segment(from, point).with_interval(0.0, BEFORE_LIGHT),
+        LightEnd::Infinity => Ray::new(from, sample.direction.as_dvec3()),
+    }
+}
+
+/// Which clear surfaces a shadow ray passes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Clear {
+    /// Rough or smooth, sheets and solids.
+    All,
+    /// Those that do not scatter.
+    Smooth,
+    /// Those that neither scatter nor bend.
+    SmoothSheets,
+}
+
 /// Casts rays for one thread, and counts them.
 ///
 /// `TEXTURES`: materials may have textures. `FILTERED`: some hits have to be asked about before they count (alpha,
@@ -104,7 +125,8 @@ impl<'a, const TEXTURES: bool, const FILTERED: bool> Tracer<'a, TEXTURES, FILTER
             if FILTERED {
                 this.stage.accel.closest_hit_filtered(&ray, source, |hit| this.is_seen(&ray, hit))
             } else {
-                this.stage.accel.closest_hit_filtered(&ray, source, |_| true)
+                // A spawned ray starts off its surface for certain: nothing has to be left out.
+                this.stage.accel.closest_hit(&ray)
             }
         })
     }
@@ -150,14 +172,11 @@ impl<'a, const TEXTURES: bool, const FILTERED: bool> Tracer<'a, TEXTURES, FILTER
         if !self.shadows {
             return Vec3::ONE;
         }
-        let ray = match sample.end {
-            LightEnd::At(point) => Ray::segment(from, point),
-            LightEnd::Infinity => Ray::new(from, sample.direction.as_dvec3()),
-        };
+        let ray = towards(from, sample);
         self.timed(kind, |this| {
             let Some(ray) = this.clipped(&ray) else { return Vec3::ONE };
             if FILTERED {
-                return this.filtered_transmittance(&ray, sample.target, source);
+                return this.filtered_transmittance(&ray, sample.target, source, Clear::All);
             }
             let target = sample.target;
             let blocked =
@@ -166,7 +185,29 @@ impl<'a, const TEXTURES: bool, const FILTERED: bool> Tracer<'a, TEXTURES, FILTER
         })
     }
 
-    fn filtered_transmittance(&self, ray: &Ray<f64>, target: Option<HitId>, source: HitId) -> Vec3 {
+    /// The share of a light sample's light that arrives on a way which paths do not take in part: shadow rays pass
+    /// holes, partly covering surfaces and smooth sheets, and are stopped by solids, by what is rough, and by lights
+    /// that stand in the way. Only the light of what no path can meet passes smooth solids.
+    pub(crate) fn lit(&mut self, kind: RayKind, from: DVec3, sample: &LightSample, source: HitId) -> Vec3 {
+        if !self.shadows {
+            return Vec3::ONE;
+        }
+        let ray = towards(from, sample);
+        self.timed(kind, |this| {
+            let area = &this.stage.lights.area;
+            if area.has_own() && area.own_hit(&ray).is_some() {
+                return Vec3::ZERO;
+            }
+            let Some(ray) = this.clipped(&ray) else { return Vec3::ONE };
+            if FILTERED {
+                let clear = if sample.pdf.is_none() { Clear::Smooth } else { Clear::SmoothSheets };
+                return this.filtered_transmittance(&ray, sample.target, source, clear);
+            }
+            if this.stage.accel.any_hit(&ray) { Vec3::ZERO } else { Vec3::ONE }
+        })
+    }
+
+    fn filtered_transmittance(&self, ray: &Ray<f64>, target: Option<HitId>, source: HitId, clear: Clear) -> Vec3 {
         /// Less light than this is none.
         const NEGLIGIBLE: f32 = 1e-4;
         let (stage, world) = (self.stage, &self.stage.world);
@@ -193,17 +234,20 @@ impl<'a, const TEXTURES: bool, const FILTERED: bool> Tracer<'a, TEXTURES, FILTER
                 return false;
             }
             let mut through = Vec3::ZERO;
-            if material.is_clear() {
+            if material.is_clear() && (clear != Clear::SmoothSheets || !material.solid) {
                 let crossing = world.crossing(hit, ray);
                 let cos = crossing.normal.dot(direction).abs() as f32;
-                through = material.straight_through::<TEXTURES>(&surface, cos);
+                through = match clear {
+                    Clear::All => material.straight_through::<TEXTURES>(&surface, cos),
+                    _ => material.passes_smoothly::<TEXTURES>(&surface, cos),
+                };
                 if material.solid {
                     let way = |t: f64| (t * length) as f32;
                     let entering = crossing.normal.dot(direction) < 0.0;
                     absorbed += material.absorption * if entering { -way(hit.t) } else { way(hit.t) };
                     // A ball or the like is asked about once: this is its other side.
                     if let Some(exit) = crossing.exit {
-                        through *= material.straight_through::<TEXTURES>(&surface, cos);
+                        through *= through;
                         absorbed += material.absorption * way(exit);
                     }
                 }

@@ -8,6 +8,9 @@ use firsthit_geometry::{Primitive, Ray, Shape, shapes::Sphere};
 use firsthit_import::scene::{LightKind, SurfaceDesc};
 use glam::{DVec3, Vec3};
 
+use super::choice::{Chosen, around, flat};
+use super::environment::luminance;
+use super::tree::LightBounds;
 use super::{LightEnd, LightSample};
 use crate::distribution::Distribution1D;
 use crate::surface::World;
@@ -125,6 +128,26 @@ impl ShapeLight {
     }
 }
 
+impl ShapeLight {
+    /// Where it is and shines.
+    fn bounds(&self) -> LightBounds {
+        let radiance = luminance(self.radiance);
+        match &self.form {
+            Form::Rectangle { corner, u, v, normal, area } => {
+                let corners = [*corner, *corner + *u, *corner + *v, *corner + *u + *v];
+                flat(&corners, normal.as_vec3(), radiance * *area as f32, false)
+            }
+            Form::Sphere(ball) => {
+                let (min, max) = around(&[ball.center() - ball.radius(), ball.center() + ball.radius()]);
+                // Its disk as it is seen from anywhere.
+                let area = PI * ball.radius() * ball.radius();
+                let strength = radiance * area as f32;
+                LightBounds { min, max, strength, axis: Vec3::Z, cos_facing: -1.0, cos_shining: 0.0, both_sides: false }
+            }
+        }
+    }
+}
+
 /// 1 - cos of the half angle under which a ball is seen; `None` from inside.
 fn one_minus_cos_of_ball(sphere: &Sphere<f64>, from: DVec3) -> Option<f64> {
     let sin2 = sphere.radius() * sphere.radius() / (sphere.center() - from).length_squared();
@@ -160,14 +183,38 @@ fn from_surface(
     })
 }
 
-/// A triangle of a glowing mesh, in the world.
+/// A triangle of a glowing mesh, in the world; or two that are a parallelogram and glow evenly.
 #[derive(Clone, Debug)]
 struct GlowingTriangle {
+    /// Its own id, or that of the first.
     id: HitId,
     corners: [DVec3; 3],
     normal: DVec3,
+    /// Of all of it.
     area: f64,
     both_sides: bool,
+    /// It is a parallelogram: the first corner and the others span it.
+    doubled: bool,
+}
+
+impl GlowingTriangle {
+    /// The corner across from the first of a parallelogram.
+    fn fourth(&self) -> DVec3 {
+        self.corners[1] + self.corners[2] - self.corners[0]
+    }
+
+    /// This and another as one, if they are the halves of a parallelogram.
+    fn doubled(&self, other: &Self) -> Option<Self> {
+        let size = (self.corners[1] - self.corners[0]).abs() + (self.corners[2] - self.corners[0]).abs();
+        let same = |a: DVec3, b: DVec3| (a - b).abs().max_element() <= 1e-6 * size.max_element();
+        // Turned so that the first corner is the one that the other triangle lacks.
+        let turned = (0..3).map(|k| [0, 1, 2].map(|i| self.corners[(i + k) % 3])).find(|corners| {
+            let fourth = corners[1] + corners[2] - corners[0];
+            [fourth, corners[1], corners[2]].iter().all(|p| other.corners.iter().any(|q| same(*p, *q)))
+        })?;
+        let facing = self.normal.dot(other.normal) > 0.999;
+        facing.then(|| Self { corners: turned, area: 2.0 * self.area, doubled: true, ..self.clone() })
+    }
 }
 
 /// All glowing triangles, chosen in proportion to the light they give.
@@ -175,7 +222,11 @@ struct GlowingTriangle {
 pub(crate) struct MeshLight {
     triangles: Vec<GlowingTriangle>,
     table: Distribution1D,
-    /// Index of the first triangle of each (instance, geometry).
+    /// The light of all of them: luminance times area.
+    strength: f32,
+    /// Which of them each triangle of a glowing mesh is, or is part of.
+    parts: Vec<u32>,
+    /// Where among the parts the triangles of each (instance, geometry) begin.
     first: HashMap<(u32, u32), usize>,
 }
 
@@ -184,14 +235,28 @@ impl MeshLight {
     /// multiply with what the material there says. A triangle does not light itself.
     pub(crate) fn sample(&self, from: DVec3, choice: f32, u: [f32; 2], receiver: HitId) -> Option<(LightSample, Hit)> {
         let (i, _) = self.table.sample(choice);
+        let area = 1.0 / f64::from(self.table.probability(i));
+        self.sample_triangle(i, area, from, u, receiver)
+    }
+
+    /// A point of one triangle as seen from `from`, with the density of a triangle that is `factor` times as large:
+    /// 1 over the probability of choosing it.
+    pub(crate) fn sample_triangle(
+        &self,
+        i: usize,
+        factor: f64,
+        from: DVec3,
+        u: [f32; 2],
+        receiver: HitId,
+    ) -> Option<(LightSample, Hit)> {
         let triangle = &self.triangles[i];
         if triangle.id == receiver {
             return None;
         }
-        let [a, b, c] = warp::triangle(u);
+        let [a, b, c] = if triangle.doubled { [1.0 - u[0] - u[1], u[0], u[1]] } else { warp::triangle(u) };
         let [p, q, r] = triangle.corners;
         let at = p * f64::from(a) + q * f64::from(b) + r * f64::from(c);
-        let area = triangle.area / f64::from(self.table.probability(i));
+        let area = triangle.area * factor;
         let sample = from_surface(from, at, triangle.normal, area, Vec3::ONE, triangle.both_sides, Some(triangle.id))?;
         Some((sample, Hit { id: triangle.id, t: 1.0, u: b, v: c, normal: triangle.normal }))
     }
@@ -199,13 +264,34 @@ impl MeshLight {
     /// Density of [`MeshLight::sample`] over solid angle for a direction that meets triangle `id` at `distance`; 0
     /// for what is not in the table.
     pub(crate) fn pdf(&self, id: HitId, direction: DVec3, distance: f64) -> f32 {
-        let Some(first) = self.first.get(&(id.instance, id.geometry)) else { return 0.0 };
-        let i = first + id.primitive as usize;
+        let Some(i) = self.index(id) else { return 0.0 };
+        self.table.probability(i) * self.pdf_of_triangle(i, direction, distance)
+    }
+
+    /// The place of a triangle of the scene among the glowing ones.
+    #[inline]
+    pub(crate) fn index(&self, id: HitId) -> Option<usize> {
+        let first = self.first.get(&(id.instance, id.geometry))?;
+        self.parts.get(first + id.primitive as usize).map(|i| *i as usize)
+    }
+
+    /// Density over solid angle of a point that is chosen evenly on a triangle.
+    #[inline]
+    pub(crate) fn pdf_of_triangle(&self, i: usize, direction: DVec3, distance: f64) -> f32 {
         let triangle = &self.triangles[i];
         let cos = triangle.normal.dot(direction).abs();
-        let pdf = f64::from(self.table.probability(i)) * distance * distance / (triangle.area * cos);
+        let pdf = distance * distance / (triangle.area * cos);
         if pdf.is_finite() { pdf as f32 } else { 0.0 }
     }
+}
+
+/// How a geometry glows.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Glow {
+    /// To the back as well.
+    pub(crate) both_sides: bool,
+    /// The same everywhere: there is no texture.
+    pub(crate) even: bool,
 }
 
 /// Glowing surfaces of a scene.
@@ -213,6 +299,8 @@ impl MeshLight {
 pub(crate) struct AreaLights {
     pub(crate) shapes: Vec<ShapeLight>,
     pub(crate) mesh: Option<MeshLight>,
+    /// Some of the shapes are lights of their own.
+    own: bool,
     /// Glowing shapes that cannot be sampled: they are seen, but light nothing but mirrors.
     pub(crate) unsampled: usize,
 }
@@ -222,18 +310,21 @@ impl AreaLights {
     pub(crate) fn new(
         lights: impl Iterator<Item = ShapeLight>,
         world: &World,
-        glowing: impl Fn(HitId) -> Option<bool>,
+        glowing: impl Fn(HitId) -> Option<Glow>,
         radiance: impl Fn(HitId, f32, f32) -> Vec3,
     ) -> Self {
-        let mut area = Self { shapes: lights.collect(), mesh: None, unsampled: 0 };
-        let (mut triangles, mut weights, mut first) = (Vec::new(), Vec::new(), HashMap::new());
+        let mut area = Self { shapes: lights.collect(), ..Self::default() };
+        area.own = !area.shapes.is_empty();
+        let (mut triangles, mut weights, mut first) = (Vec::<GlowingTriangle>::new(), Vec::new(), HashMap::new());
+        let mut parts = Vec::new();
         for (i, instance) in world.instances.iter().enumerate() {
             for (g, geometry) in world.scene.meshes[instance.mesh].geometries.iter().enumerate() {
                 let id = HitId { instance: i as u32, geometry: g as u32, primitive: 0 };
-                let Some(both_sides) = glowing(id) else { continue };
+                let Some(Glow { both_sides, even }) = glowing(id) else { continue };
                 match &geometry.surface {
                     SurfaceDesc::Triangles(mesh) => {
-                        first.insert((id.instance, id.geometry), triangles.len());
+                        first.insert((id.instance, id.geometry), parts.len());
+                        let before = triangles.len();
                         for (k, corners) in mesh.triangles.iter().enumerate() {
                             let id = HitId { primitive: k as u32, ..id };
                             let local = corners.map(|c| mesh.positions[c as usize].as_dvec3());
@@ -244,7 +335,17 @@ impl AreaLights {
                             let side = instance.transform.matrix3.determinant().signum();
                             let normal = cross.normalize_or_zero() * side;
                             let glow = radiance(id, 1.0 / 3.0, 1.0 / 3.0).max_element();
-                            triangles.push(GlowingTriangle { id, corners, normal, area, both_sides });
+                            let triangle = GlowingTriangle { id, corners, normal, area, both_sides, doubled: false };
+                            let last = triangles.len().checked_sub(1).filter(|i| *i >= before && even);
+                            let last = last.filter(|i| !triangles[*i].doubled);
+                            if let Some((i, both)) = last.and_then(|i| Some((i, triangles[i].doubled(&triangle)?))) {
+                                parts.push(i as u32);
+                                weights[i] += area as f32 * glow;
+                                triangles[i] = both;
+                                continue;
+                            }
+                            parts.push(triangles.len() as u32);
+                            triangles.push(triangle);
                             weights.push(area as f32 * glow);
                         }
                     }
@@ -261,8 +362,21 @@ impl AreaLights {
         for (weight, triangle) in weights.iter_mut().zip(&triangles) {
             *weight += 0.05 * total * (triangle.area / whole) as f32;
         }
-        area.mesh = Distribution1D::new(&weights).map(|table| MeshLight { triangles, table, first });
+        let strength = 1.05 * total;
+        area.mesh = Distribution1D::new(&weights).map(|table| MeshLight { triangles, table, strength, parts, first });
         area
+    }
+
+    /// Where the shapes are and shine, then the triangles, in their order.
+    pub(crate) fn bounds(&self, bounds: &mut Vec<LightBounds>) {
+        bounds.extend(self.shapes.iter().map(ShapeLight::bounds));
+        let Some(mesh) = &self.mesh else { return };
+        bounds.extend(mesh.triangles.iter().enumerate().map(|(i, t)| {
+            let strength = mesh.table.probability(i) * mesh.strength;
+            let [p, q, r] = t.corners;
+            let corners = if t.doubled { [p, q, r, t.fourth()] } else { [p, q, r, r] };
+            flat(&corners, t.normal.as_vec3(), strength, t.both_sides)
+        }));
     }
 
     /// The nearest light of its own (not part of the scene's trees) in a ray's way.
@@ -270,6 +384,36 @@ impl AreaLights {
         let own = self.shapes.iter().filter(|l| l.id.is_none());
         let hits = own.filter_map(|l| l.hit(ray).map(|t| (t, l)));
         hits.min_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    /// Whether there are lights of their own.
+    #[inline]
+    pub(crate) fn has_own(&self) -> bool {
+        self.own
+    }
+
+    /// The nearest light of its own in a ray's way, by its place among the shapes.
+    pub(crate) fn own_hit(&self, ray: &Ray<f64>) -> Option<(f64, usize)> {
+        let own = self.shapes.iter().enumerate().filter(|(_, l)| l.id.is_none());
+        let hits = own.filter_map(|(i, l)| l.hit(ray).map(|t| (t, i)));
+        hits.min_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    /// The light that a primitive of the scene is, if it can be asked.
+    pub(crate) fn light_of(&self, id: HitId) -> Option<Chosen> {
+        match self.shapes.iter().position(|l| l.id == Some(id)) {
+            Some(i) => Some(Chosen::Shape(i)),
+            None => self.mesh.as_ref().and_then(|m| m.index(id)).map(Chosen::Triangle),
+        }
+    }
+
+    /// Density over solid angle of the directions to one of the lights, once it is chosen.
+    pub(crate) fn density(&self, light: Chosen, from: DVec3, direction: DVec3, distance: f64) -> f32 {
+        match light {
+            Chosen::Shape(i) => self.shapes[i].pdf(from, direction, distance),
+            Chosen::Triangle(i) => self.mesh.as_ref().map_or(0.0, |m| m.pdf_of_triangle(i, direction, distance)),
+            Chosen::Punctual(_) | Chosen::Environment => 0.0,
+        }
     }
 
     /// Density with which direct light would have chosen this way to glowing primitive `id` of the scene.
@@ -349,6 +493,27 @@ mod tests {
         assert!(light.hit(&Ray::new(DVec3::ZERO, DVec3::Y)).is_some());
         assert!(light.hit(&Ray::new(DVec3::new(0.0, 4.0, 0.0), DVec3::NEG_Y)).is_none());
         assert!(light.sample(DVec3::new(0.0, 4.0, 0.0), [0.5; 2]).is_none());
+    }
+
+    #[test]
+    fn halves_of_a_parallelogram_are_one_light() {
+        let triangle = |corners: [DVec3; 3]| {
+            let cross = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+            let id = HitId { instance: 0, geometry: 0, primitive: 0 };
+            let (normal, area) = (cross.normalize(), 0.5 * cross.length());
+            GlowingTriangle { id, corners, normal, area, both_sides: false, doubled: false }
+        };
+        let [a, b, c, d] = [DVec3::ZERO, DVec3::X, DVec3::new(1.3, 1.0, 0.0), DVec3::new(0.3, 1.0, 0.0)];
+        for (first, second) in [([a, b, c], [a, c, d]), ([b, c, a], [c, d, a]), ([a, b, d], [b, c, d])] {
+            let both = triangle(first).doubled(&triangle(second)).unwrap();
+            assert!((both.area - 1.0).abs() < 1e-12);
+            let corners = [both.corners[0], both.corners[1], both.corners[2], both.fourth()];
+            for p in [a, b, c, d] {
+                assert!(corners.iter().any(|q| (p - *q).length() < 1e-12), "{corners:?}");
+            }
+        }
+        assert!(triangle([a, b, c]).doubled(&triangle([a, d, c])).is_none(), "it faces the other way");
+        assert!(triangle([a, b, c]).doubled(&triangle([a, c, d + DVec3::Y])).is_none());
     }
 
     #[test]

@@ -1,9 +1,11 @@
 //! Where light comes from.
 
 pub(crate) mod area;
+pub(crate) mod choice;
 pub mod environment;
 pub(crate) mod punctual;
 pub mod studio;
+pub(crate) mod tree;
 
 use firsthit_accel::HitId;
 use glam::{DVec3, Vec3};
@@ -32,6 +34,13 @@ pub(crate) struct LightSample {
     pub(crate) target: Option<HitId>,
 }
 
+impl LightSample {
+    /// The same for a light that was chosen among others.
+    pub(crate) fn chosen_with(self, probability: f32) -> Self {
+        Self { radiance: self.radiance / probability, pdf: self.pdf.map(|p| p * probability), ..self }
+    }
+}
+
 /// Everything that shines.
 #[derive(Clone, Debug)]
 pub(crate) struct Lights {
@@ -41,6 +50,8 @@ pub(crate) struct Lights {
     pub(crate) environment: Option<environment::Environment>,
     /// Whether direct light comes from it (else it is only seen and mirrored).
     pub(crate) sample_environment: bool,
+    /// Which light a point asks that asks but one.
+    pub(crate) choice: choice::LightChoice,
     /// Even light, in place of what surfaces send to each other: radiance.
     pub(crate) ambient: Vec3,
     /// How near things must be to take that light away.

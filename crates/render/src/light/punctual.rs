@@ -3,6 +3,8 @@
 use firsthit_import::scene::{LightKind, SpotRamp};
 use glam::{DVec3, Vec3};
 
+use super::environment::luminance;
+use super::tree::LightBounds;
 use super::{LightEnd, LightSample};
 use crate::warp;
 
@@ -72,6 +74,39 @@ impl PunctualLight {
             }),
             LightKind::Rectangle { .. } | LightKind::Sphere { .. } => None,
         }
+    }
+
+    /// Where it is and shines, if it has a place.
+    pub(crate) fn bounds(&self) -> Option<LightBounds> {
+        let Self::Point { position, intensity, cone, .. } = self else { return None };
+        let (axis, cos_facing, cos_shining) = match cone {
+            None => (Vec3::Z, -1.0, 0.0),
+            // As bright as in the middle up to the inner angle, then less and less.
+            Some(c) => (c.axis, c.inner.cos(), (c.outer - c.inner).max(1e-3).cos()),
+        };
+        let strength = luminance(*intensity);
+        Some(LightBounds {
+            min: *position,
+            max: *position,
+            strength: if strength.is_finite() { strength } else { 0.0 },
+            axis,
+            cos_facing,
+            cos_shining,
+            both_sides: false,
+        })
+    }
+
+    /// Of lights without a place: the direction towards it, the irradiance on what faces it, and the sine of half the
+    /// angle under which it is seen.
+    pub(crate) fn from_afar(&self, point: DVec3) -> Option<(Vec3, f32, f32)> {
+        let spread = match self {
+            Self::Point { .. } => return None,
+            Self::Directional { one_minus_cos, .. } => (one_minus_cos * (2.0 - one_minus_cos)).max(0.0).sqrt(),
+            Self::Headlight { .. } => 0.0,
+        };
+        // The middle of its disk.
+        let sample = self.sample(point, [0.0; 2])?;
+        Some((sample.direction, luminance(sample.radiance), spread))
     }
 
     /// Light that arrives at a point. `radiance` is the irradiance on a surface that faces the light.

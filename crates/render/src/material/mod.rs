@@ -187,6 +187,15 @@ impl Material {
             }
     }
 
+    /// Whether light that goes through the boundary is not scattered there.
+    pub(crate) fn is_smooth<const TEXTURES: bool>(&self, surface: &Surface<'_>) -> bool {
+        match &self.model {
+            Model::RoughGlass { .. } => false,
+            Model::Pbr(pbr) => pbr.is_smooth::<TEXTURES>(surface),
+            _ => true,
+        }
+    }
+
     /// How much of the surface is there: 1 all, 0 nothing.
     pub(crate) fn coverage<const TEXTURES: bool>(&self, surface: &Surface<'_>) -> f32 {
         self.pbr().map_or(1.0, |p| p.coverage::<TEXTURES>(surface))
@@ -219,6 +228,11 @@ impl Material {
     /// Whether it glows on both sides.
     pub(crate) fn glows_on_both_sides(&self) -> bool {
         self.pbr().is_some_and(|p| p.double_sided)
+    }
+
+    /// Whether it glows the same everywhere.
+    pub(crate) fn glows_evenly(&self) -> bool {
+        self.pbr().is_none_or(Pbr::glows_evenly)
     }
 
     /// Radiance sent to the viewer by the surface itself.

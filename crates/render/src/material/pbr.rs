@@ -166,6 +166,10 @@ impl Pbr {
         self.emissive.max_element() > 0.0 && !self.unlit
     }
 
+    pub(super) fn glows_evenly(&self) -> bool {
+        self.emissive_texture.is_none()
+    }
+
     fn base<const TEXTURES: bool>(&self, surface: &Surface<'_>) -> glam::Vec4 {
         self.base_color * color::<TEXTURES>(self.base_color_texture.as_ref(), surface) * surface.color()
     }
@@ -190,6 +194,11 @@ impl Pbr {
         let transmission = self.transmission * scalar::<TEXTURES>(self.transmission_texture.as_ref(), surface);
         let reflected = self.fresnel::<TEXTURES>(surface, base, metallic, 1.0).reflectance(cos);
         base * (transmission * (1.0 - metallic)) * (Vec3::ONE - reflected).max(Vec3::ZERO)
+    }
+
+    pub(super) fn is_smooth<const TEXTURES: bool>(&self, surface: &Surface<'_>) -> bool {
+        let roughness = self.roughness * scalar::<TEXTURES>(self.roughness_texture.as_ref(), surface);
+        roughness * roughness <= LEAST_ALPHA
     }
 
     pub(super) fn emission<const TEXTURES: bool>(&self, surface: &Surface<'_>) -> Vec3 {

@@ -23,7 +23,10 @@ const fn channel_names(aov: Aov) -> &'static [&'static str] {
         Aov::Depth => &["Z"],
         Aov::Normal | Aov::GeometricNormal => &["X", "Y", "Z"],
         Aov::Uv | Aov::Barycentric => &["U", "V"],
-        Aov::Albedo | Aov::InstanceId | Aov::MaterialId | Aov::PrimitiveId | Aov::Heat => &["R", "G", "B"],
+        Aov::Samples => &["N"],
+        Aov::Variance | Aov::Albedo | Aov::InstanceId | Aov::MaterialId | Aov::PrimitiveId | Aov::Heat => {
+            &["R", "G", "B"]
+        }
     }
 }
 

@@ -1,0 +1,121 @@
+//! A surface's lobes as one: drawn from by chance, weighed together.
+
+use glam::Vec3;
+
+use crate::material::lobes::{Lobe, LobeKind};
+use crate::material::{Bsdf, MAX_LOBES};
+
+/// A way on from a surface.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Scattered {
+    /// Where the light comes from, in the frame of the lobes.
+    pub(super) wi: Vec3,
+    /// f |cos| / density of all lobes together; of a delta lobe the share of light over its chance.
+    pub(super) weight: Vec3,
+    /// Density of all followed lobes together; `None` for a delta lobe.
+    pub(super) pdf: Option<f32>,
+    /// Which lobe it was drawn from.
+    pub(super) lobe: usize,
+}
+
+/// How a surface scatters towards one viewer.
+pub(super) struct Scatter<'a> {
+    bsdf: &'a Bsdf,
+    wo: Vec3,
+    /// How often each lobe is followed.
+    chances: [f32; MAX_LOBES],
+    /// Whether light from a chosen direction is scattered at all: not all lobes are delta functions.
+    pub(super) spreads: bool,
+}
+
+/// Whether it scatters in one direction alone.
+pub(super) fn is_delta(lobe: &Lobe) -> bool {
+    matches!(lobe, Lobe::SpecularReflection(_) | Lobe::SpecularTransmission(_))
+}
+
+/// What following a lobe is: mirroring, going through, or (diffuse, or a coat so rough that it is as good as diffuse)
+/// gathering the light between surfaces.
+pub(super) fn family(lobe: &Lobe) -> LobeKind {
+    let even = match lobe {
+        Lobe::GgxReflection(ggx) => is_even(ggx.alpha, || ggx.fresnel.reflectance(1.0)),
+        Lobe::AnisotropicGgx(ggx) => is_even(ggx.alpha.min_element(), || ggx.fresnel.reflectance(1.0)),
+        Lobe::Clearcoat(coat) => coat.alpha > super::ROUGHEST_FOLLOWED,
+        _ => false,
+    };
+    if even { LobeKind::DIFFUSE } else { lobe.kind() }
+}
+
+fn is_even(alpha: f32, reflectance: impl FnOnce() -> Vec3) -> bool {
+    alpha > super::ROUGHEST_FOLLOWED && reflectance().max_element() < 0.2
+}
+
+impl<'a> Scatter<'a> {
+    /// `throughput` is that of the path up to here: lobes are chosen by what they add to it.
+    #[inline]
+    pub(super) fn new(bsdf: &'a Bsdf, viewer: Vec3, throughput: Vec3, follow: LobeKind) -> Self {
+        let wo = bsdf.local(viewer);
+        let mut chances = [0.0; MAX_LOBES];
+        let (mut spreads, mut sum) = (false, 0.0);
+        for (chance, lobe) in chances.iter_mut().zip(bsdf.lobes()) {
+            spreads |= !is_delta(lobe);
+            if follow.contains(family(lobe)) {
+                *chance = (throughput * lobe.albedo(wo)).max_element().max(0.0);
+                sum += *chance;
+            }
+        }
+        let scale = if sum > 0.0 && sum.is_finite() { 1.0 / sum } else { 0.0 };
+        for chance in &mut chances {
+            *chance *= scale;
+        }
+        Self { bsdf, wo, chances, spreads }
+    }
+
+    /// f |cos| of all lobes towards a direction of their frame, and the density with which following them would have
+    /// found it.
+    #[inline]
+    pub(super) fn towards(&self, wi: Vec3) -> (Vec3, f32) {
+        let (mut f, mut pdf) = (Vec3::ZERO, 0.0);
+        for (lobe, chance) in self.bsdf.lobes().iter().zip(self.chances) {
+            f += lobe.eval(self.wo, wi);
+            if chance > 0.0 {
+                pdf += chance * lobe.pdf(self.wo, wi);
+            }
+        }
+        (f, pdf)
+    }
+
+    /// Draws a lobe by the first number and a direction by the others.
+    #[inline]
+    pub(super) fn sample(&self, choice: impl FnOnce() -> f32, u: [f32; 2]) -> Option<Scattered> {
+        let lobes = self.bsdf.lobes();
+        let mut index = self.chances.iter().position(|c| *c > 0.0)?;
+        if self.chances[index] < 1.0 {
+            let mut left = choice();
+            for (i, chance) in self.chances.iter().enumerate().filter(|(_, c)| **c > 0.0) {
+                index = i;
+                left -= chance;
+                if left < 0.0 {
+                    break;
+                }
+            }
+        }
+        let (lobe, chance) = (lobes.get(index)?, self.chances[index]);
+        let sample = lobe.sample(self.wo, u)?;
+        let Some(own) = sample.pdf else {
+            return Some(Scattered { wi: sample.wi, weight: sample.weight / chance, pdf: None, lobe: index });
+        };
+        if lobes.len() == 1 {
+            return Some(Scattered { wi: sample.wi, weight: sample.weight, pdf: Some(own), lobe: index });
+        }
+        // What was drawn is known without asking the lobe again.
+        let (mut f, mut pdf) = (sample.weight * own, chance * own);
+        for (i, (other, chance)) in lobes.iter().zip(self.chances).enumerate() {
+            if i != index && chance > 0.0 {
+                f += other.eval(self.wo, sample.wi);
+                pdf += chance * other.pdf(self.wo, sample.wi);
+            }
+        }
+        let weight = f / pdf;
+        (pdf > 0.0 && weight.is_finite()).then_some(Scattered { wi: sample.wi, weight, pdf: Some(pdf), lobe: index })
+    }
+}
