@@ -98,7 +98,7 @@ fn compared(name: &str, rendered: &Rendered) -> Difference {
     let noise: serde_json::Value =
         serde_json::from_slice(&std::fs::read(folder(name).join("ref.json")).unwrap()).unwrap();
     let noise = noise["ref_noise_mse"].as_f64().unwrap();
-    let sum = |p: &[Vec3]| p.iter().map(|p| p.as_dvec3()).sum::<glam::DVec3>();
+    let sum = |p: &[Vec3]| p.iter().map(|p| p.as_dvec3()).sum::<DVec3>();
     let (all, expected) = (sum(&ours), sum(&theirs));
     let all_variance: f64 =
         variance.iter().map(|v| f64::from(v[0] + v[1] + v[2]) / 3.0).sum::<f64>() / ours.len() as f64;
