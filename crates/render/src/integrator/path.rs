@@ -199,13 +199,15 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
             seen.color += walk.throughput * shading.emission * share;
         }
         let lobes = shading.bsdf.lobes();
-        if lobes.is_empty() || walk.bounce >= limits.bounces {
+        // Clear sheets are passed at the last surface too: light that is asked there comes through them.
+        let (ends, sheet) = (walk.bounce >= limits.bounces, material.is_clear() && !material.solid);
+        if lobes.is_empty() || (ends && !sheet) {
             return false;
         }
         let scatter = Scatter::new(&shading.bsdf, wo, walk.throughput, limits.follow);
         let sampler = if walk.layers == 0 { sampler } else { sampler.branch(walk.layers) };
         let mut asked = None;
-        if scatter.spreads {
+        if scatter.spreads && !ends {
             let receiver = receiver(&surface, shading.bsdf.normal, lobes);
             let shares = stage.lights.choice.shares(&stage.lights.punctual, &receiver);
             let vertex = Vertex {
@@ -243,6 +245,9 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
             }
             walk.pass(&surface, RayKind::Transmission);
             return true;
+        }
+        if ends {
+            return false;
         }
         if through && material.parts_colors {
             walk.colors = walk.colors.parted();
