@@ -54,6 +54,12 @@ The command line wins over it. Paths in it are relative to the current folder.
 
 Exit codes: 0 done, 1 loading or rendering failed, 2 wrong usage, 130 interrupted (the image so far is written).";
 
+const MERGE_EXAMPLES: &str = "\
+Examples:
+  firsthit render a.glb --samples-range 0..512 --checkpoint first.sums -o first.png       on one machine
+  firsthit render a.glb --samples-range 512..1024 --checkpoint second.sums -o second.png  on another
+  firsthit merge first.sums second.sums -o a.png                                          as if all on one";
+
 const INSPECT_EXAMPLES: &str = "\
 Examples:
   firsthit inspect helmet.glb
@@ -80,6 +86,8 @@ pub(crate) enum Command {
     Bench(BenchArgs),
     /// Say in numbers how pictures differ from a reference.
     Compare(CompareArgs),
+    /// Join shares of one picture, rendered anywhere, into one.
+    Merge(MergeArgs),
     /// Print a script that completes this program's options in a shell.
     Completions {
         /// The shell.
@@ -88,7 +96,7 @@ pub(crate) enum Command {
     /// Print a manual page (roff).
     Man {
         /// The page of one command instead of the program's.
-        #[arg(value_parser = ["render", "inspect", "accuracy", "bench", "compare", "completions", "man"])]
+        #[arg(value_parser = ["render", "inspect", "merge", "accuracy", "bench", "compare", "completions", "man"])]
         command: Option<String>,
     },
 }
@@ -163,6 +171,18 @@ pub(crate) struct QualityArgs {
     /// --noise-threshold is given]
     #[arg(long, value_name = "TIME", value_parser = values::time)]
     pub(crate) time_limit: Option<Duration>,
+
+    /// Keep all that has been summed in this file: every minute, on Ctrl-C, at the time limit and at the end
+    #[arg(long, value_name = "FILE")]
+    pub(crate) checkpoint: Option<PathBuf>,
+
+    /// Go on with what --checkpoint kept, with the same model and options; more samples may be asked for
+    #[arg(long, value_name = "FILE")]
+    pub(crate) resume: Option<PathBuf>,
+
+    /// Take only samples A to B-1 of each pixel (A a multiple of 16): a share, for `firsthit merge` of --checkpoint files
+    #[arg(long, value_name = "A..B", value_parser = values::samples, conflicts_with_all = ["spp", "noise_threshold"])]
+    pub(crate) samples_range: Option<(u32, u32)>,
 
     /// Where sample points come from: sobol, or independent random numbers for comparison
     #[arg(long, value_name = "NAME", default_value = "sobol", value_parser = values::sampler)]
@@ -324,6 +344,30 @@ pub(crate) struct RunArgs {
     /// Print all warnings and what is being done
     #[arg(short, long, overrides_with = "quiet")]
     pub(crate) verbose: bool,
+}
+
+#[derive(Args, Debug)]
+#[command(args_override_self = true, after_help = MERGE_EXAMPLES)]
+pub(crate) struct MergeArgs {
+    /// The checkpoints of the shares, in any order
+    #[arg(value_name = "SHARE", required = true)]
+    pub(crate) shares: Vec<PathBuf>,
+
+    /// Where to write: .png, .exr or .hdr
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: PathBuf,
+
+    /// Keep the sums in this file too
+    #[arg(long, value_name = "FILE")]
+    pub(crate) checkpoint: Option<PathBuf>,
+
+    /// Brighten a PNG by this many stops, darken it if negative
+    #[arg(long, value_name = "EV", default_value = "0", value_parser = values::number, allow_hyphen_values = true)]
+    pub(crate) exposure: f64,
+
+    /// How radiance becomes the colours of a PNG: pbr-neutral, agx, srgb or none (linear)
+    #[arg(long, value_name = "NAME", default_value = "pbr-neutral", value_parser = values::tone_mapping)]
+    pub(crate) tone_mapping: ViewTransform,
 }
 
 #[derive(Args, Debug)]

@@ -12,6 +12,7 @@ mod hdri;
 mod inspect;
 mod interrupt;
 mod measured;
+mod merge;
 mod progress;
 mod render;
 mod report;
@@ -46,6 +47,7 @@ fn run(command: Command, config: Option<&std::path::Path>) -> Result<Exit, Failu
         Command::Accuracy(args) => accuracy::run(&args),
         Command::Bench(args) => bench::run(&args),
         Command::Compare(args) => compare::run(&args).map(|()| Exit::Done),
+        Command::Merge(args) => merge::run(&args).map(|()| Exit::Done),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "firsthit", &mut script);

@@ -1,10 +1,12 @@
 //! How far a render or a measurement is: a bar on a terminal, a line now and then elsewhere.
 
 use std::io::{self, IsTerminal};
+use std::path::PathBuf;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use firsthit_render::Monitor;
+use firsthit_render::output::write_checkpoint;
+use firsthit_render::{Monitor, Sums};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::console::{message, short};
@@ -42,6 +44,24 @@ pub(crate) struct Progress {
     last: Mutex<Instant>,
     bar: ProgressBar,
     interrupt: Interrupt,
+    keep: Option<Keep>,
+}
+
+/// A file in which sums are kept now and then.
+pub(crate) struct Keep {
+    pub(crate) path: PathBuf,
+    /// Words that say which picture it is.
+    pub(crate) picture: String,
+    last: Mutex<Instant>,
+}
+
+/// So often.
+const KEEP: Duration = Duration::from_secs(60);
+
+impl Keep {
+    pub(crate) fn new(path: PathBuf, picture: String) -> Self {
+        Self { path, picture, last: Mutex::new(Instant::now()) }
+    }
 }
 
 /// A bar is not redrawn more often than this.
@@ -49,6 +69,11 @@ const REDRAW: Duration = Duration::from_millis(100);
 
 impl Progress {
     pub(crate) fn new(style: Style, label: &'static str, interrupt: Interrupt) -> Self {
+        Self::keeping(style, label, interrupt, None)
+    }
+
+    /// With a file in which sums are kept.
+    pub(crate) fn keeping(style: Style, label: &'static str, interrupt: Interrupt, keep: Option<Keep>) -> Self {
         let bar = match style {
             Style::Bar => ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::stderr()),
             _ => ProgressBar::hidden(),
@@ -57,7 +82,7 @@ impl Progress {
             bar.set_style(style);
         }
         let now = Instant::now();
-        Self { style, label, started: now, last: Mutex::new(now), bar, interrupt }
+        Self { style, label, started: now, last: Mutex::new(now), bar, interrupt, keep }
     }
 
     /// Takes the bar away: only the results stay.
@@ -87,6 +112,21 @@ impl Monitor for Progress {
         } else {
             let percent = 100.0 * done as f64 / total.max(1) as f64;
             message(format_args!("{}: {percent:.0}%, {text}", self.label));
+        }
+    }
+
+    fn wants_checkpoint(&self) -> bool {
+        self.keep.as_ref().is_some_and(|keep| keep.last.lock().is_ok_and(|last| last.elapsed() >= KEEP))
+    }
+
+    fn checkpoint(&self, sums: &Sums<'_>) {
+        let Some(keep) = &self.keep else { return };
+        if let Err(error) = write_checkpoint(&keep.path, sums, &keep.picture) {
+            // The render is worth more: at its end the error is told again.
+            message(format_args!("warning: {error}"));
+        }
+        if let Ok(mut last) = keep.last.lock() {
+            *last = Instant::now();
         }
     }
 

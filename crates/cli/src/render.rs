@@ -5,12 +5,12 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use firsthit_accel::{BuildOptions, SceneBuilder};
-use firsthit_import::scene::Settings;
+use firsthit_import::scene::{Pixels, Settings};
 use firsthit_import::{Imported, Report};
 use firsthit_render::{
-    Aov, Background, CameraChanges, Clip, IntegratorChoice, RenderOptions, Rendered, Stage, StageOptions, View,
-    ViewTransform,
-    output::{BitDepth, WriteOptions, write_film, write_png},
+    Aov, Background, CameraChanges, Clip, EnvironmentChoice, IntegratorChoice, RenderOptions, Rendered, Stage,
+    StageOptions, View, ViewTransform,
+    output::{BitDepth, WriteOptions, write_checkpoint, write_film, write_png},
 };
 
 use crate::args::{CameraArgs, QualityArgs, RenderArgs};
@@ -18,7 +18,8 @@ use crate::console::{Console, message, print, print_json};
 use crate::error::{Exit, Failure};
 use crate::hdri;
 use crate::interrupt::Interrupt;
-use crate::progress::{Progress, Style, duration};
+use crate::merge;
+use crate::progress::{Keep, Progress, Style, duration};
 use crate::report::{Counts, RenderReport, Seconds, effects, explain_effects, rays_in_words, warnings};
 use crate::simd;
 use crate::target::Target;
@@ -75,6 +76,18 @@ impl Job<'_> {
         let stage_options = stage_options(args, &options, &self.target)?;
         seconds.load = started.elapsed().as_secs_f64();
 
+        let picture = self.words(&report, &options, &stage_options);
+        let start = match &args.quality.resume {
+            Some(path) => {
+                let (start, of) = merge::read(path)?;
+                if of != picture {
+                    let words = format_args!("{}: it is of another model or of other options", path.display());
+                    return Err(Failure::failed(words).hint("repeat the options of the render that was put aside"));
+                }
+                Some(start)
+            }
+            None => None,
+        };
         let started = Instant::now();
         self.console.detail("building trees");
         let build = BuildOptions { precision: args.quality.precision, simd: simd::level()?, ..Default::default() };
@@ -101,10 +114,14 @@ impl Job<'_> {
         let started = Instant::now();
         self.interrupt.begin();
         let style = Style::new(args.run.progress, args.run.no_progress, args.run.quiet);
-        let progress = Progress::new(style, "rendering", self.interrupt.clone());
-        let rendered = firsthit_render::render(&stage, &options, &progress);
+        let keep = args.quality.checkpoint.clone().map(|path| Keep::new(path, picture.clone()));
+        let progress = Progress::keeping(style, "rendering", self.interrupt.clone(), keep);
+        let rendered = firsthit_render::render_from(&stage, &options, start, &progress);
         progress.finish();
         let rendered = rendered.map_err(|e| self.at_model(&e))?;
+        if let Some(path) = &args.quality.checkpoint {
+            write_checkpoint(path, &rendered.sums(), &picture).map_err(Failure::failed)?;
+        }
         seconds.render = started.elapsed().as_secs_f64();
 
         let started = Instant::now();
@@ -147,6 +164,25 @@ impl Job<'_> {
         // The picture is there to be looked at, whatever is said about it.
         self.console.bad_samples(rendered.stats.bad_samples, args.run.strict)?;
         Ok(if rendered.interrupted { Exit::Interrupted } else { Exit::Done })
+    }
+
+    /// What decides the samples of a picture, in words: the files, and the options but for how many samples are taken.
+    fn words(&self, report: &Report, options: &RenderOptions, stage: &StageOptions) -> String {
+        let mut words = String::new();
+        for path in &report.files {
+            let length = std::fs::metadata(path).map_or(0, |m| m.len());
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            words += &format!("{name} {length}\n");
+        }
+        let mut options = options.clone();
+        (options.spp, options.first_sample, options.noise_threshold, options.time_limit) = (16, 0, None, None);
+        let mut stage = stage.clone();
+        if let EnvironmentChoice::Map(image) = &mut stage.environment {
+            // Its pixels would fill the file.
+            image.pixels = Pixels::Rgba8(Arc::new([]));
+        }
+        let (hdri, precision) = (&self.args.scene.hdri, self.args.quality.precision);
+        words + &format!("{options:?}\n{stage:?}\n{hdri:?} {precision:?} {:?}", self.args.scene.up)
     }
 
     /// Refuses to write over a file that this render was made from.
@@ -225,6 +261,9 @@ impl Effort {
     fn new(args: &QualityArgs) -> Self {
         let asked = args.noise_threshold.map(|e| e as f32);
         let adaptive = matches!(args.integrator, IntegratorChoice::Auto | IntegratorChoice::Path);
+        if let Some((_, end)) = args.samples_range {
+            return Self { spp: end, noise_threshold: None, time_limit: args.time_limit, announce: false };
+        }
         let (spp, noise_threshold, time_limit) = match (args.spp, asked, args.time_limit) {
             (Some(spp), asked, limit) => (spp, asked, limit),
             (None, None, limit) if adaptive => (1024, Some(0.03), Some(limit.unwrap_or(Duration::from_secs(60)))),
@@ -256,6 +295,7 @@ fn render_options(args: &RenderArgs, settings: &Settings) -> Result<RenderOption
         width,
         height,
         spp: effort.spp,
+        first_sample: args.quality.samples_range.map_or(0, |(first, _)| first),
         noise_threshold: effort.noise_threshold,
         time_limit: effort.time_limit,
         sampler: args.quality.sampler,

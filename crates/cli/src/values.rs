@@ -93,6 +93,14 @@ pub(crate) fn sampler(s: &str) -> Result<SamplerChoice, String> {
     found.ok_or_else(|| format!("expected one of: {}", SamplerChoice::ALL.map(SamplerChoice::name).join(", ")))
 }
 
+/// The first sample, and the one after the last.
+pub(crate) fn samples(s: &str) -> Result<(u32, u32), String> {
+    let range = s.split_once("..").and_then(|(a, b)| Some((whole(a)?, whole(b)?)));
+    range
+        .filter(|(a, b)| a < b && a.is_multiple_of(16))
+        .ok_or_else(|| "expected A..B with A below B and a multiple of 16, as in 64..128".into())
+}
+
 pub(crate) fn filter(s: &str) -> Result<FilterChoice, String> {
     Ok(match s {
         "auto" => FilterChoice::Auto,
@@ -362,6 +370,12 @@ mod tests {
         assert!(["-1", "1.5", "1e20", "many", "nan"].iter().all(|s| count(s).is_err()));
         assert_eq!(scenario("s15").map(|s| s.id), Ok("S15"));
         assert!(scenario("S99").is_err_and(|e| e.contains("S1, S2")));
+    }
+
+    #[test]
+    fn shares_begin_at_blocks() {
+        assert_eq!(samples("64..100"), Ok((64, 100)));
+        assert!(["1..2", "16..16", "32..16", "16", "..", "a..b"].iter().all(|s| samples(s).is_err()));
     }
 
     #[test]

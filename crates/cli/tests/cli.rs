@@ -361,6 +361,28 @@ fn without_a_number_samples_are_taken_until_the_noise_is_low_or_time_is_up() {
 }
 
 #[test]
+fn a_render_is_put_aside_gone_on_with_and_joined_of_shares() {
+    let folder = Folder::new();
+    let render = |args: &[&str]| folder.run(&[&["render", "cube.obj", "--resolution", "16x16"], args].concat());
+    let bytes = |name: &str| std::fs::read(folder.path(name)).unwrap();
+    render(&["-s", "64", "-o", "whole.exr"]).code(0);
+    render(&["-s", "20", "-o", "part.exr", "--checkpoint", "part.sums"]).code(0);
+    render(&["-s", "64", "-o", "resumed.exr", "--resume", "part.sums", "--checkpoint", "part.sums"]).code(0);
+    assert!(bytes("whole.exr") == bytes("resumed.exr"));
+    for share in ["0..16", "16..48", "48..64"] {
+        let name = format!("{share}.sums");
+        render(&["--samples-range", share, "--checkpoint", &name, "-o", "share.exr"]).code(0);
+    }
+    folder.run(&["merge", "48..64.sums", "0..16.sums", "16..48.sums", "-o", "merged.exr"]).code(0);
+    assert!(bytes("whole.exr") == bytes("merged.exr"));
+    folder.run(&["merge", "48..64.sums", "0..16.sums", "-o", "m.exr"]).fails(1, &["48..64.sums", "after sample 16"]);
+    render(&["-s", "64", "--seed", "1", "--resume", "part.sums"]).fails(1, &["part.sums", "other options"]);
+    folder.run(&["merge", "cube.obj", "-o", "m.exr"]).fails(1, &["cube.obj", "no checkpoint"]);
+    render(&["--samples-range", "3..9"]).fails(2, &["multiple of 16"]);
+    assert!(!folder.path("m.exr").exists());
+}
+
+#[test]
 fn explain_says_what_was_chosen_and_what_each_effect_cost() {
     let folder = Folder::new();
     let run = folder.render(&["--explain"]).code(0);

@@ -9,6 +9,9 @@ use crate::{Aov, Crop};
 /// Samples whose f32 sum is kept before it goes into the f64 total.
 const BLOCK: u32 = 16;
 
+/// Bytes of an [`Accumulator`] in a file.
+pub(crate) const RECORD: usize = 64;
+
 /// The samples of one pixel in one picture, summed in a way that does not depend on pauses.
 ///
 /// Each aligned block of 16 samples is summed in f32, the blocks in f64, both in order: rendering in several passes,
@@ -57,6 +60,38 @@ impl Accumulator {
             // Of a block's mean, by the number of blocks but one; of the mean of all blocks.
             (spread / (block * block) / (n - 1.0)) as f32
         }))
+    }
+
+    /// Adds all samples of another, which follow these: both hold whole blocks.
+    pub(crate) fn join(&mut self, next: &Self) {
+        self.total = std::array::from_fn(|i| self.total[i] + next.total[i]);
+        self.squares = std::array::from_fn(|i| self.squares[i] + next.squares[i]);
+        self.block = next.block;
+        self.count += next.count;
+    }
+
+    /// For files.
+    pub(crate) fn to_bytes(self) -> [u8; RECORD] {
+        let total = self.total.iter().flat_map(|x| x.to_le_bytes());
+        let floats = self.block.iter().chain(&self.squares).flat_map(|x| x.to_le_bytes());
+        let mut bytes = [0; RECORD];
+        for (to, from) in bytes.iter_mut().zip(total.chain(floats).chain(self.count.to_le_bytes())) {
+            *to = from;
+        }
+        bytes
+    }
+
+    /// From files.
+    pub(crate) fn from_bytes(bytes: &[u8; RECORD]) -> Self {
+        let double = |i: usize| f64::from_le_bytes(std::array::from_fn(|k| bytes[8 * i + k]));
+        let word = |i: usize| u32::from_le_bytes(std::array::from_fn(|k| bytes[32 + 4 * i + k]));
+        let float = |i: usize| f32::from_bits(word(i));
+        Self {
+            total: std::array::from_fn(double),
+            block: std::array::from_fn(float),
+            squares: std::array::from_fn(|i| float(4 + i)),
+            count: word(7),
+        }
     }
 
     /// How many samples there are.
@@ -170,6 +205,15 @@ impl Film {
     /// The pictures beside the colour that samples add to, in the order of [`Band::pixel`].
     pub(crate) fn sampled(&self) -> impl Iterator<Item = Aov> {
         self.aovs.iter().copied().filter(|a| a.is_sampled())
+    }
+
+    /// All pixels of all layers.
+    pub(crate) fn records(&self) -> impl Iterator<Item = &Accumulator> {
+        self.pixels.iter()
+    }
+
+    pub(crate) fn records_mut(&mut self) -> impl Iterator<Item = &mut Accumulator> {
+        self.pixels.iter_mut()
     }
 
     /// The colour of a pixel by its place in the whole picture.

@@ -2,6 +2,7 @@
 
 mod aov;
 pub mod camera;
+mod checkpoint;
 pub mod distribution;
 mod effects;
 pub mod film;
@@ -27,6 +28,7 @@ pub mod warp;
 
 pub use aov::Aov;
 pub use camera::{Camera, CameraError};
+pub use checkpoint::{Checkpoint, CheckpointError, Sums};
 pub use effects::{EffectEntry, EffectPlan, EffectSet};
 pub use film::Film;
 pub use light::environment::Environment;
@@ -35,7 +37,7 @@ pub use options::{
     Background, CameraChanges, CameraChoice, Clip, Crop, EffectOverrides, EnvironmentChoice, FilterChoice,
     IntegratorChoice, RenderOptions, StageOptions, TextureFilter,
 };
-pub use render::{RenderError, Rendered, render};
+pub use render::{RenderError, Rendered, render, render_from};
 pub use stage::{Stage, StageError};
 pub use stats::{RayCounts, RayKind, RenderStats};
 pub use view::{View, ViewTransform};

@@ -2,11 +2,23 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use crate::Sums;
+
 /// Told how far a render is, and asked whether it shall go on. Called from the rendering threads: be quick.
 pub trait Monitor: Sync {
     /// `done` of `total` pixel blocks are finished, by `rays` rays so far.
     fn progress(&self, done: u64, total: u64, rays: u64) {
         let _ = (done, total, rays);
+    }
+
+    /// Whether [`Monitor::checkpoint`] is to be called now. Asked after each pass, and within long ones.
+    fn wants_checkpoint(&self) -> bool {
+        false
+    }
+
+    /// All that has been summed so far. The render waits.
+    fn checkpoint(&self, sums: &Sums<'_>) {
+        let _ = sums;
     }
 
     /// True: finish nothing more; the picture so far is returned.

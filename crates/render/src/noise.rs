@@ -23,6 +23,21 @@ impl Tiles {
         Self { window, across, active: vec![true; across as usize * down as usize] }
     }
 
+    /// How many there are.
+    pub(crate) fn count(&self) -> usize {
+        self.active.len()
+    }
+
+    /// Which of them still get samples.
+    pub(crate) fn active(&self) -> &[bool] {
+        &self.active
+    }
+
+    /// Takes up what was decided before.
+    pub(crate) fn set_active(&mut self, active: &[bool]) {
+        self.active.copy_from_slice(active);
+    }
+
     /// Whether the tile of a pixel (by its place in the whole picture) still gets samples.
     #[inline]
     pub(crate) fn is_active(&self, x: u32, y: u32) -> bool {

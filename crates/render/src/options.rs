@@ -17,6 +17,8 @@ pub struct RenderOptions {
     pub height: u32,
     /// Samples per pixel, >= 1; with a noise threshold or a time limit the most of them.
     pub spp: u32,
+    /// The first sample, for a share of a render that is joined with others later: a multiple of 16, below `spp`.
+    pub first_sample: u32,
     /// Tiles of 16 x 16 pixels get no more samples once their noise is estimated to be below this: the root of the
     /// mean of variance / (value^2 + 0.01). 0.03 looks clean. At least 32 samples are taken, if `spp` allows.
     pub noise_threshold: Option<f32>,
@@ -46,6 +48,7 @@ impl Default for RenderOptions {
             width: 1280,
             height: 720,
             spp: 16,
+            first_sample: 0,
             noise_threshold: None,
             time_limit: None,
             sampler: SamplerChoice::Sobol,

@@ -7,9 +7,10 @@ use firsthit_accel::TraversalCounts;
 use firsthit_geometry::Aabb;
 use firsthit_geometry::clip::{ClipRegion, HalfSpace};
 use glam::Vec3;
-use rayon::iter::ParallelIterator;
+use rayon::iter::{IndexedParallelIterator, ParallelIterator};
 
 use crate::camera::{Cone, FilmCamera};
+use crate::checkpoint::Rest;
 use crate::film::{Accumulator, Band};
 use crate::filter::Filter;
 use crate::integrator::whitted::{Limits, Seen};
@@ -18,8 +19,8 @@ use crate::material::lobes::LobeKind;
 use crate::noise::Tiles;
 use crate::sampler::{Dimension, PixelSampler};
 use crate::{
-    Aov, Clip, EffectPlan, EffectSet, Film, FilterChoice, IntegratorChoice, Monitor, RayCounts, RenderOptions,
-    RenderStats, Stage,
+    Aov, Checkpoint, Clip, EffectPlan, EffectSet, Film, FilterChoice, IntegratorChoice, Monitor, RayCounts,
+    RenderOptions, RenderStats, Stage, Sums,
 };
 
 /// Options that no picture can be made with.
@@ -37,6 +38,17 @@ pub enum RenderError {
     /// No samples.
     #[error("at least one sample per pixel is needed")]
     NoSamples,
+    /// The samples asked for do not begin at a block's, or there are none.
+    #[error("samples {first} to {end}: a share begins at a multiple of 16 and has at least one")]
+    Share {
+        /// The first sample asked for.
+        first: u32,
+        /// The one after the last.
+        end: u32,
+    },
+    /// What is to be gone on with is of another picture.
+    #[error("the checkpoint is of a picture of another size, window or first sample, or with other pictures beside it")]
+    OtherPicture,
     /// The crop window has no pixel in the picture.
     #[error("the crop window lies outside the picture")]
     EmptyCrop,
@@ -64,6 +76,9 @@ impl RenderOptions {
         if self.spp == 0 {
             return Err(RenderError::NoSamples);
         }
+        if !self.first_sample.is_multiple_of(16) || self.first_sample >= self.spp {
+            return Err(RenderError::Share { first: self.first_sample, end: self.spp });
+        }
         match Film::bytes(width, height, self.crop, &self.aovs) {
             0 => Err(RenderError::EmptyCrop),
             bytes if bytes > Self::MOST_FILM_BYTES => Err(RenderError::Memory { bytes }),
@@ -85,12 +100,23 @@ pub struct Rendered {
     pub interrupted: bool,
     /// Whether the time was up before all samples were taken, or all tiles were as good as wanted.
     pub out_of_time: bool,
+    rest: Rest,
+}
+
+impl Rendered {
+    /// All that has been summed, and where the render would go on.
+    #[must_use]
+    pub fn sums(&self) -> Sums<'_> {
+        Sums { film: &self.film, rest: &self.rest }
+    }
 }
 
 /// No path has more bounces, whatever is asked for: between perfect mirrors it would never end.
 const MOST_BOUNCES: u32 = 1024;
 /// Rows of a band, the unit of work of a thread.
 const BAND: u32 = 4;
+/// Between so many bands a checkpoint may be made.
+const AT_ONCE: usize = 64;
 /// Of so many pixels one is timed.
 const TIMED: u32 = 61;
 /// Textures are averaged over this share of a pixel: the samples of a pixel average the rest.
@@ -111,19 +137,51 @@ pub fn render<M: Monitor + ?Sized>(
     options: &RenderOptions,
     monitor: &M,
 ) -> Result<Rendered, RenderError> {
+    render_from(stage, options, None, monitor)
+}
+
+/// Goes on with a render that was put aside, with the same stage and options but for how many samples are taken: in the
+/// end the bits are those of a render without a pause. A smaller noise threshold takes up all tiles again.
+///
+/// # Errors
+/// When the options describe no picture, or the checkpoint is of another one.
+pub fn render_from<M: Monitor + ?Sized>(
+    stage: &Stage,
+    options: &RenderOptions,
+    start: Option<Checkpoint>,
+    monitor: &M,
+) -> Result<Rendered, RenderError> {
     options.check()?;
     let RenderOptions { width, height, crop, ref aovs, .. } = *options;
     let mut film = Film::new(width, height, crop, aovs)
         .map_err(|_| RenderError::Memory { bytes: Film::bytes(width, height, crop, aovs) })?;
+    let mut tiles = Tiles::new(film.window());
+    let mut rest = Rest { first: options.first_sample, pass: options.first_sample, ..Rest::default() };
+    if let Some(start) = start {
+        let same = start.film.size() == film.size() && start.film.window() == film.window();
+        if !same || start.film.aovs() != film.aovs() || start.rest.first != options.first_sample {
+            return Err(RenderError::OtherPicture);
+        }
+        film = start.film;
+        if start.rest.threshold == options.noise_threshold {
+            tiles.set_active(&start.rest.active);
+            rest.pass = start.rest.pass;
+        } else {
+            // The tile with the fewest samples says where.
+            let least = film.records().map(Accumulator::count).min().unwrap_or(0);
+            rest.pass = last_pass(options.first_sample + least);
+        }
+    }
+    rest.threshold = options.noise_threshold;
     let start = Instant::now();
     let effects = stage.plan().simulated();
     // Chosen once: the rest is compiled for what the scene calls for.
     let job = Job::new(stage, options, &film);
     let (done, end) = match (effects.contains(EffectSet::TEXTURES), stage.is_filtered()) {
-        (false, false) => job.run::<false, false, M>(&mut film, monitor),
-        (false, true) => job.run::<false, true, M>(&mut film, monitor),
-        (true, false) => job.run::<true, false, M>(&mut film, monitor),
-        (true, true) => job.run::<true, true, M>(&mut film, monitor),
+        (false, false) => job.run::<false, false, M>(&mut film, &mut tiles, &mut rest, monitor),
+        (false, true) => job.run::<false, true, M>(&mut film, &mut tiles, &mut rest, monitor),
+        (true, false) => job.run::<true, false, M>(&mut film, &mut tiles, &mut rest, monitor),
+        (true, true) => job.run::<true, true, M>(&mut film, &mut tiles, &mut rest, monitor),
     };
     let mut plan = stage.plan().clone();
     if !matches!(job.method, Method::Path(_)) {
@@ -140,11 +198,11 @@ pub fn render<M: Monitor + ?Sized>(
         rays: done.rays,
         samples: done.samples,
         bad_samples: done.bad,
-        noise: Tiles::new(film.window()).most(&film),
+        noise: tiles.most(&film),
         seconds: start.elapsed().as_secs_f64(),
     };
     let (interrupted, out_of_time) = (end == End::Cancelled, end == End::OutOfTime);
-    Ok(Rendered { film, stats, effects, interrupted, out_of_time })
+    Ok(Rendered { film, stats, effects, interrupted, out_of_time, rest })
 }
 
 /// Why a render ends.
@@ -247,42 +305,51 @@ impl<'a> Job<'a> {
     fn run<const TEXTURES: bool, const FILTERED: bool, M: Monitor + ?Sized>(
         &self,
         film: &mut Film,
+        tiles: &mut Tiles,
+        rest: &mut Rest,
         monitor: &M,
     ) -> (Done, End) {
         let window = film.window();
         let bands = u64::from(window.height.div_ceil(BAND));
         let total = bands * u64::from(self.options.spp);
         let (finished, rays) = (AtomicU64::new(0), AtomicU64::new(0));
-        let mut tiles = Tiles::new(window);
         let mut done = Done::default();
-        let mut first = 0;
-        while first < self.options.spp && tiles.any() {
-            let last = match first {
-                0 => 1,
-                1..4 => 4,
-                n => (n / 16 + 1) * 16,
+        rest.active = tiles.active().to_vec();
+        while rest.pass < self.options.spp && tiles.any() {
+            let first = rest.pass;
+            let last = next_pass(first).min(self.options.spp);
+            for some in (0..bands as usize).step_by(AT_ONCE) {
+                let pass = film
+                    .par_bands_mut(BAND)
+                    .skip(some)
+                    .take(AT_ONCE)
+                    .map(|mut band| {
+                        let mut tracer = Tracer::<TEXTURES, FILTERED>::new(self.stage, &self.clip);
+                        let band_done = self.band(&mut tracer, &mut band, first..last, tiles, monitor);
+                        let finished = finished.fetch_add(u64::from(last - first), Ordering::Relaxed);
+                        let rays = rays.fetch_add(band_done.rays.total(), Ordering::Relaxed) + band_done.rays.total();
+                        monitor.progress(finished + u64::from(last - first), total, rays);
+                        band_done
+                    })
+                    .reduce(Done::default, Done::and);
+                done = done.and(pass);
+                if monitor.cancelled() {
+                    return (done, End::Cancelled);
+                }
+                if monitor.wants_checkpoint() {
+                    monitor.checkpoint(&Sums { film, rest });
+                }
             }
-            .min(self.options.spp);
-            let pass = film
-                .par_bands_mut(BAND)
-                .map(|mut band| {
-                    let mut tracer = Tracer::<TEXTURES, FILTERED>::new(self.stage, &self.clip);
-                    let band_done = self.band(&mut tracer, &mut band, first..last, &tiles, monitor);
-                    let finished = finished.fetch_add(u64::from(last - first), Ordering::Relaxed);
-                    let rays = rays.fetch_add(band_done.rays.total(), Ordering::Relaxed) + band_done.rays.total();
-                    monitor.progress(finished + u64::from(last - first), total, rays);
-                    band_done
-                })
-                .reduce(Done::default, Done::and);
-            done = done.and(pass);
-            if monitor.cancelled() {
-                return (done, End::Cancelled);
+            if self.is_late(first) {
+                // Not all of the pass was rendered, perhaps.
+                return (done, End::OutOfTime);
             }
-            first = last;
+            rest.pass = last;
             if let Some(threshold) = self.options.noise_threshold {
                 tiles.judge(film, threshold);
+                rest.active = tiles.active().to_vec();
             }
-            if self.is_late(first) && first < self.options.spp && tiles.any() {
+            if self.is_late(last) && last < self.options.spp && tiles.any() {
                 return (done, End::OutOfTime);
             }
         }
@@ -291,7 +358,7 @@ impl<'a> Job<'a> {
 
     /// Whether time is up for samples from this one on; every pixel gets the first.
     fn is_late(&self, first: u32) -> bool {
-        first > 0 && self.deadline.is_some_and(|end| Instant::now() >= end)
+        first > self.options.first_sample && self.deadline.is_some_and(|end| Instant::now() >= end)
     }
 
     fn band<const TEXTURES: bool, const FILTERED: bool, M: Monitor + ?Sized>(
@@ -312,7 +379,9 @@ impl<'a> Job<'a> {
                     continue;
                 }
                 tracer.timed = (x.wrapping_mul(31).wrapping_add(y.wrapping_mul(17))) % TIMED == 0;
-                for sample in samples.clone() {
+                // What a pixel has it need not get again.
+                let from = self.options.first_sample + band.pixel(x, y)[0].count();
+                for sample in samples.start.max(from)..samples.end {
                     done.bad += u64::from(!self.sample(tracer, band.pixel(x, y), x, y, sample));
                     done.samples += 1;
                 }
@@ -357,6 +426,25 @@ impl<'a> Job<'a> {
             pixel[1 + i].add(if value.iter().all(|v| v.is_finite()) { value } else { [0.0; 4] });
         }
         good
+    }
+}
+
+/// The sample after the last of the pass that begins with this one.
+fn next_pass(first: u32) -> u32 {
+    match first {
+        0 => 1,
+        1..4 => 4,
+        n => (n / 16 + 1) * 16,
+    }
+}
+
+/// The first sample of the pass that this one is in.
+fn last_pass(sample: u32) -> u32 {
+    match sample {
+        0 => 0,
+        1..4 => 1,
+        4..16 => 4,
+        n => n / 16 * 16,
     }
 }
 

@@ -6,7 +6,10 @@ use std::time::Duration;
 use firsthit_import::SceneDesc;
 use firsthit_import::scene::{AlphaMode, LightKind, MaterialModel};
 use firsthit_render::sampler::SamplerChoice;
-use firsthit_render::{Aov, Crop, EffectOverrides, EffectSet, IntegratorChoice, RayKind, RenderOptions, StageOptions};
+use firsthit_render::{
+    Aov, Checkpoint, Crop, EffectOverrides, EffectSet, IntegratorChoice, Monitor, RayKind, RenderOptions, StageOptions,
+    render, render_from,
+};
 use glam::{DVec3, Vec3, Vec4};
 
 use super::common::{self, Probe, ball, quad, scene_of};
@@ -342,4 +345,64 @@ fn ordered_points_are_better_than_independent_ones() {
     let (sobol, independent) = (error(SamplerChoice::Sobol), error(SamplerChoice::Independent));
     println!("Sobol {sobol}, independent {independent}");
     assert!(sobol < 0.6 * independent, "{sobol} against {independent}");
+}
+
+/// A render that is stopped anywhere, kept, and gone on with has the bits of one without a pause; so have shares.
+#[test]
+fn pauses_and_shares_leave_no_trace() {
+    /// Stops after so many pieces of work.
+    struct Stop(std::sync::atomic::AtomicI64);
+    impl Monitor for Stop {
+        fn progress(&self, _: u64, _: u64, _: u64) {
+            self.0.fetch_sub(1, std::sync::atomic::Ordering::Relaxed);
+        }
+        fn cancelled(&self) -> bool {
+            self.0.load(std::sync::atomic::Ordering::Relaxed) <= 0
+        }
+    }
+    let scene = std::sync::Arc::new(everything());
+    let stage = common::stage(&scene, &StageOptions::default());
+    let kept = |sums: &firsthit_render::Sums<'_>| {
+        let mut bytes = Vec::new();
+        sums.write(&mut bytes, "words").unwrap();
+        assert!(
+            Checkpoint::read(&mut &bytes[..bytes.len() - 1]).is_err() && Checkpoint::read(&mut &bytes[1..]).is_err()
+        );
+        let (read, words) = Checkpoint::read(&mut bytes.as_slice()).unwrap();
+        assert_eq!(words, "words");
+        read
+    };
+    let aovs = vec![Aov::Normal, Aov::Samples, Aov::Variance];
+    for threshold in [None, Some(0.05)] {
+        let options = RenderOptions { noise_threshold: threshold, aovs: aovs.clone(), ..small(96) };
+        let whole = render(&stage, &options, &()).unwrap();
+        for pieces in [1, 9, 30, 45] {
+            let part = render(&stage, &options, &Stop(pieces.into())).unwrap();
+            assert!(part.interrupted && part.stats.samples < whole.stats.samples);
+            let resumed = render_from(&stage, &options, Some(kept(&part.sums())), &()).unwrap();
+            assert_eq!(resumed.film, whole.film, "{threshold:?}, after {pieces} pieces");
+        }
+    }
+    // With fewer samples first, and a lower threshold later.
+    let options = RenderOptions { aovs, ..small(96) };
+    let whole = render(&stage, &options, &()).unwrap();
+    for first in
+        [RenderOptions { spp: 37, ..options.clone() }, RenderOptions { noise_threshold: Some(1.0), ..options.clone() }]
+    {
+        let part = render(&stage, &first, &()).unwrap();
+        assert_eq!(render_from(&stage, &options, Some(kept(&part.sums())), &()).unwrap().film, whole.film);
+    }
+    let share = |first_sample, spp| {
+        let options = RenderOptions { first_sample, spp, ..options.clone() };
+        kept(&render(&stage, &options, &()).unwrap().sums())
+    };
+    let mut joined = share(0, 32);
+    assert!(joined.join(&share(48, 96)).is_err(), "samples 32 to 47 are missing");
+    joined.join(&share(32, 48)).unwrap();
+    joined.join(&share(48, 96)).unwrap();
+    assert_eq!(joined.samples(), 0..96);
+    assert_eq!(joined.film.color(), whole.film.color());
+    let other = RenderOptions { width: 47, ..options.clone() };
+    assert!(render_from(&stage, &other, Some(joined), &()).is_err(), "another picture");
+    assert!(render(&stage, &RenderOptions { first_sample: 8, ..options }, &()).is_err(), "not at a block");
 }

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 pub use png::write_png;
 
 use crate::film::Picture;
-use crate::{Aov, Film, View};
+use crate::{Aov, Film, Sums, View};
 
 /// A file format for pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -128,6 +128,14 @@ pub fn files(path: &Path, aovs: &[Aov]) -> Result<Vec<PathBuf>, OutputError> {
 /// [`OutputError::Io`] when it cannot be written.
 pub fn write_text(path: &Path, text: &str) -> Result<(), OutputError> {
     atomically(path, |out| out.write_all(text.as_bytes())).map_err(failed(path))
+}
+
+/// Writes what a render has come to, whole or not at all: see [`Sums::write`].
+///
+/// # Errors
+/// [`OutputError::Io`] when it cannot be written.
+pub fn write_checkpoint(path: &Path, sums: &Sums<'_>, picture: &str) -> Result<(), OutputError> {
+    atomically(path, |out| sums.write(out, picture)).map_err(failed(path))
 }
 
 /// Writes a picture as a PNG file of 8 bits a channel, whole or not at all.
