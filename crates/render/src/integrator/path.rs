@@ -302,7 +302,8 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
     fn ask(&mut self, at: &Vertex<'_, '_>, bsdf: &Bsdf, limits: Limits) -> Vec3 {
         let stage = self.stage;
         let lights = &stage.lights;
-        let u = at.sampler.get1(Dimension::LightChoice(at.bounce));
+        let choice = &lights.choice;
+        let u = if choice.is_single() { 0.0 } else { at.sampler.get1(Dimension::LightChoice(at.bounce)) };
         let all_followed = limits.follow.contains(LobeKind::DIFFUSE);
         let mut light = Vec3::ZERO;
         if !all_followed && let Some(environment) = &lights.environment {
@@ -312,7 +313,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
                 light += self.arrives_at(at, bsdf, &from_around(s, 1.0), RayKind::ShadowEnvironment);
             }
         }
-        let Some((chosen, probability)) = lights.choice.sample(&lights.punctual, &at.shares, &at.receiver, u) else {
+        let Some((chosen, probability)) = choice.sample(&lights.punctual, &at.shares, &at.receiver, u) else {
             return light;
         };
         let from = at.surface.point.position;

@@ -55,6 +55,10 @@ impl<'a> Scatter<'a> {
     pub(super) fn new(bsdf: &'a Bsdf, viewer: Vec3, throughput: Vec3, follow: LobeKind) -> Self {
         let wo = bsdf.local(viewer);
         let mut chances = [0.0; MAX_LOBES];
+        if let [lobe] = bsdf.lobes() {
+            chances[0] = f32::from(u8::from(follow.contains(family(lobe))));
+            return Self { bsdf, wo, chances, spreads: !is_delta(lobe) };
+        }
         let (mut spreads, mut sum) = (false, 0.0);
         for (chance, lobe) in chances.iter_mut().zip(bsdf.lobes()) {
             spreads |= !is_delta(lobe);

@@ -80,6 +80,12 @@ impl LightChoice {
         irradiance * (direction.dot(to.normal) + spread).clamp(to.least_cos, 1.0)
     }
 
+    /// Whether there is nothing to choose: it is always the same light.
+    #[inline]
+    pub(crate) fn is_single(&self) -> bool {
+        self.distant.is_empty() && self.environment == 0.0 && self.tree.is_single()
+    }
+
     /// How a point divides its questions.
     #[inline]
     pub(crate) fn shares(&self, punctual: &[PunctualLight], to: &Receiver) -> Shares {

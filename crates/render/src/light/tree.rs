@@ -211,6 +211,12 @@ impl LightTree {
         self.build(lights, second, way | 1 << level, level + 1);
     }
 
+    /// Whether there is at most one light.
+    #[inline]
+    pub(crate) fn is_single(&self) -> bool {
+        self.nodes.len() <= 1
+    }
+
     /// About the irradiance that all lights give to a point.
     #[inline]
     pub(crate) fn total(&self, to: &Receiver) -> f32 {
