@@ -69,9 +69,9 @@ fn a_white_surface_under_sheen_neither_loses_nor_makes_light() {
 #[test]
 fn rough_white_metal_keeps_all_light_unless_compensation_is_off() {
     for roughness in [0.3, 0.7, 1.0] {
-        for cos in [0.9, 0.4] {
+        for cos in [0.9f64, 0.4] {
             let scene = plain_under_sky(pbr(|m| (m.roughness, m.double_sided) = (roughness, true)));
-            let eye = DVec3::new((1.0 - cos * cos as f64).sqrt(), cos, 0.0) * 3.0;
+            let eye = DVec3::new((1.0 - cos * cos).sqrt(), cos, 0.0) * 3.0;
             let with = |energy_compensation| {
                 let stage = StageOptions { energy_compensation, ..StageOptions::default() };
                 Probe::new(&scene).stage(stage).from(eye).spp(4096).look(DVec3::ZERO).x
