@@ -14,6 +14,7 @@ render() { target/release/firsthit render --integrator whitted --max-depth 8 "$@
 # The picture of the README, and those of the lecture.
 render assets/flight-helmet/FlightHelmet.gltf -s 64 --resolution 960x540 -o $out/flight-helmet.png
 render assets/scenes/whitted.toml -s 64 --resolution 960x540 -o $out/whitted.png
+render assets/scenes/layers.toml -s 64 --resolution 720x405 -o $out/layers.png
 small=(--resolution 480x270 -s 64)
 render assets/scenes/shapes.toml "${small[@]}" -o $out/lecture-shapes.png
 render assets/scenes/section.toml "${small[@]}" --clip-plane 0,0,1,0 -o $out/lecture-section.png

@@ -268,7 +268,7 @@ impl<'a> Job<'a> {
         let size = if extent.is_finite() && extent.max_element() > 0.0 { extent.length() } else { 1.0 };
         let mut follow = LobeKind::empty();
         follow.set(LobeKind::REFLECTION, simulated.contains(EffectSet::REFLECTION));
-        let through = EffectSet::REFRACTION | EffectSet::TRANSMISSION;
+        let through = EffectSet::REFRACTION | EffectSet::TRANSMISSION | EffectSet::DIFFUSE_TRANSMISSION;
         follow.set(LobeKind::TRANSMISSION, simulated.intersects(through));
         let method = match options.integrator {
             IntegratorChoice::Auto | IntegratorChoice::Path => {

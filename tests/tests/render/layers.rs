@@ -7,7 +7,7 @@ use firsthit_import::scene::{
     Anisotropy, Clearcoat, DiffuseTransmission, EnvironmentDesc, Filter, ImageDesc, Iridescence, LightKind,
     MaterialModel, PbrMaterial, Pixels, Sheen, TextureRef,
 };
-use firsthit_render::{EffectOverrides, EffectSet, StageOptions};
+use firsthit_render::{EffectOverrides, EffectSet, IntegratorChoice, StageOptions};
 use glam::{DVec3, Vec3};
 
 use crate::common::{self, Probe, ball, mapped_quad, quad, scene_of};
@@ -113,6 +113,45 @@ fn light_from_behind_comes_through_diffusely() {
         assert!((below - DVec3::new(1.0, 0.5, 0.25) * factor).abs().max_element() < 1e-4, "{below}");
         let above = Probe::new(&scene).from(DVec3::new(0.0, 3.0, 0.0)).look(at);
         assert!((above - DVec3::splat(0.8 * (1.0 - factor))).abs().max_element() < 1e-4, "{above}");
+    }
+}
+
+/// What is not reflected comes from the sky behind.
+#[test]
+fn a_white_sheet_that_lets_light_through_vanishes_under_an_even_sky() {
+    for factor in [0.3, 1.0] {
+        let through = DiffuseTransmission { factor, ..DiffuseTransmission::default() };
+        let scene = plain_under_sky(matt(1.0, |m| m.diffuse_transmission = Some(Box::new(through))));
+        for cos in [0.9, -0.3f64] {
+            for integrator in [IntegratorChoice::Whitted, IntegratorChoice::Path] {
+                let eye = DVec3::new((1.0 - cos * cos).sqrt(), cos, 0.0) * 3.0;
+                let probe = Probe::new(&scene).integrator(integrator).spp(1024);
+                assert_near(probe.from(eye).look(DVec3::ZERO).x, 1.0, 0.01);
+            }
+        }
+    }
+}
+
+/// The other integrator finds the same: every layer, through the integrator that follows all of them.
+#[test]
+fn path_tracing_agrees_about_layers() {
+    let film = Iridescence { factor: 1.0, thickness_max: 450.0, ..Iridescence::default() };
+    let sheen = Sheen { color: Vec3::new(0.9, 0.5, 0.2), roughness: 0.5, ..Sheen::default() };
+    let brushed = Anisotropy { strength: 0.7, rotation: 0.5, texture: None };
+    let materials = [
+        matt(0.4, |m| m.clearcoat = coat(1.0, 0.4)),
+        matt(0.4, |m| m.sheen = Some(Box::new(sheen))),
+        matt(0.4, |m| (m.specular, m.roughness, m.iridescence) = (1.0, 0.4, Some(Box::new(film)))),
+        pbr(|m| (m.roughness, m.anisotropy, m.double_sided) = (0.4, Some(Box::new(brushed)), true)),
+    ];
+    for (i, material) in materials.into_iter().enumerate() {
+        let scene = plain_under_sky(material);
+        let look = |integrator| {
+            let eye = DVec3::new(0.8, 0.6, 0.0) * 3.0;
+            Probe::new(&scene).integrator(integrator).spp(4096).from(eye).look(DVec3::ZERO)
+        };
+        let (whitted, path) = (look(IntegratorChoice::Whitted), look(IntegratorChoice::Path));
+        assert!((whitted / path - 1.0).abs().max_element() < 0.015, "{i}: {whitted} {path}");
     }
 }
 

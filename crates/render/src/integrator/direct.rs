@@ -54,6 +54,12 @@ impl Lit<'_> {
         total
     }
 
+    /// Whether light from behind is scattered, and no ray is followed there.
+    fn gathers_behind(&self) -> bool {
+        let through = || self.bsdf.lobes().iter().zip(self.followed).filter(|(lobe, _)| lobe.goes_through());
+        through().next().is_some() && through().all(|(_, followed)| !followed)
+    }
+
     /// Where a shadow ray starts.
     fn origin(&self, sample: &LightSample, terminator: bool) -> DVec3 {
         let (surface, point) = (self.surface, &self.surface.point);
@@ -138,7 +144,15 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
                 return Vec3::ZERO;
             }
             let sample = towards(direction, environment.radiance(direction) / pdf, pdf);
-            return self.arriving(lit, &sample, RayKind::ShadowEnvironment);
+            let mut light = self.arriving(lit, &sample, RayKind::ShadowEnvironment);
+            if lit.gathers_behind() {
+                // The same direction mirrored, in which no ray is followed.
+                let normal = lit.bsdf.normal;
+                let direction = direction - normal * (2.0 * direction.dot(normal));
+                let sample = towards(direction, environment.radiance(direction) / pdf, pdf);
+                light += self.arriving(lit, &sample, RayKind::ShadowEnvironment);
+            }
+            return light;
         }
         let (mut chosen, mut sum) = (None, 0.0);
         for i in 0..CANDIDATES {
