@@ -1,25 +1,29 @@
 //! From boxes to the shape of a tree.
 //!
-//! obvhs clusters and optimises (PLOC, parallel reinsertion, leaf collapse); its answer is copied into a [`Topology`] of
-//! bounded depth, and no type of it leaves this module. Boxes that would stall it ([`stall`]) are put into a tree by
+//! obvhs clusters and optimises (PLOC, parallel reinsertion, leaf collapse) by a [`Recipe`]; its answer is copied into a
+//! [`Topology`] of bounded depth, and no type of it leaves this module. Boxes that would stall it ([`stall`]) are put into a tree by
 //! medians instead ([`balanced`]). Blurring them at random stops the stalling too, but was no better: the tree of a row
 //! then costs 277 where medians give 16.
 
 mod balanced;
 mod emit;
+mod recipe;
 mod stall;
 
 use std::borrow::Cow;
 
 use firsthit_geometry::Aabb;
 use glam::Vec3;
-use obvhs::{BvhBuildParams, bvh2::builder::build_bvh2};
 use rayon::prelude::*;
+use recipe::Recipe;
 
 use crate::BuildQuality;
 
 /// No tree is deeper than this, so a traversal stack of this size never overflows.
 pub(crate) const MAX_DEPTH: u32 = 64;
+
+/// Primitives in a leaf at most, where one is not all there may be.
+const LEAF: u32 = 8;
 
 /// What lies below: an inner node, or a run of primitives.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -58,27 +62,21 @@ pub(crate) struct Topology {
 impl Topology {
     /// A tree over boxes, at most `u32::MAX / 2` of them, none empty.
     pub(crate) fn new(boxes: &[Aabb<f32>], quality: BuildQuality) -> Self {
-        Self::with(boxes, parameters(quality))
+        Self::with(boxes, Recipe::new(quality), LEAF)
     }
 
-    /// The same with leaves of one primitive (some may hold a few where boxes coincide): for layouts that make leaves
-    /// of their own.
+    /// The same with leaves of one primitive: for layouts that make leaves of their own. (Leaves of the tree by medians
+    /// hold a few.)
     pub(crate) fn single(boxes: &[Aabb<f32>], quality: BuildQuality) -> Self {
-        let parameters = BvhBuildParams {
-            max_prims_per_leaf: 1,
-            post_collapse_reinsertion_batch_ratio_multiplier: 0.0,
-            ..parameters(quality)
-        };
-        Self::with(boxes, parameters)
+        Self::with(boxes, Recipe::new(quality), 1)
     }
 
-    fn with(boxes: &[Aabb<f32>], parameters: BvhBuildParams) -> Self {
+    fn with(boxes: &[Aabb<f32>], recipe: Recipe, leaf: u32) -> Self {
         let boxes = &*tame(boxes);
         if !stall::stalls(boxes) {
             let items: Vec<obvhs::aabb::Aabb> =
                 boxes.par_iter().map(|b| obvhs::aabb::Aabb::new(b.min.into(), b.max.into())).collect();
-            let bvh = build_bvh2(&items, parameters, &mut core::time::Duration::default());
-            return emit::bounded(emit::copy(&bvh), boxes);
+            return emit::bounded(emit::copy(&recipe.build(&items, leaf)), boxes);
         }
         let mut tree = Self::default();
         let mut all: Vec<u32> = (0..boxes.len() as u32).collect();
@@ -114,15 +112,6 @@ fn tame(boxes: &[Aabb<f32>]) -> Cow<'_, [Aabb<f32>]> {
     let scale = MOST / f32::MAX;
     let small = |p: Vec3| (p * scale).max(Vec3::splat(-MOST)).min(Vec3::splat(MOST));
     Cow::Owned(boxes.iter().map(|b| Aabb::new(small(b.min), small(b.max))).collect())
-}
-
-fn parameters(quality: BuildQuality) -> BvhBuildParams {
-    match quality {
-        BuildQuality::Fast => BvhBuildParams::fast_build(),
-        BuildQuality::Balanced => BvhBuildParams::medium_build(),
-        // Without the splits of that preset: a primitive lies in one leaf, so every hit is found once.
-        BuildQuality::High => BvhBuildParams { pre_split: false, ..BvhBuildParams::very_slow_build() },
-    }
 }
 
 #[cfg(test)]

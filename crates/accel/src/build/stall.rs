@@ -52,20 +52,24 @@ pub(super) fn stalls(boxes: &[Aabb<f32>]) -> bool {
     false
 }
 
-/// The boxes by the Morton code of their centres, 21 bits an axis; equal codes by index.
+/// The boxes by the Morton code of their centres; equal codes by index.
 fn sorted(boxes: &[Aabb<f32>]) -> Vec<Aabb<f32>> {
     let all = boxes.iter().fold(Aabb::empty(), |a, b| a.union(*b));
-    let scale = Vec3::from(all.extent().to_array().map(|e| if e > 0.0 { (1 << 21) as f32 / e } else { 0.0 }));
-    let mut keys: Vec<(u64, u32)> = boxes
+    // Code and index share a word, which sorts twice as fast as two. At least ten bits an axis are left.
+    let index_bits = usize::BITS - boxes.len().leading_zeros();
+    let bits = ((u64::BITS - index_bits) / 3).min(21);
+    let cells = (1u32 << bits) as f32;
+    let scale = Vec3::from(all.extent().to_array().map(|e| if e > 0.0 { cells / e } else { 0.0 }));
+    let mut keys: Vec<u64> = boxes
         .par_iter()
         .enumerate()
         .map(|(i, b)| {
-            let cell = ((b.center() - all.min) * scale).as_uvec3().min(glam::UVec3::splat((1 << 21) - 1));
-            (spread(cell.x) | spread(cell.y) << 1 | spread(cell.z) << 2, i as u32)
+            let cell = ((b.center() - all.min) * scale).as_uvec3().min(glam::UVec3::splat((1 << bits) - 1));
+            (spread(cell.x) | spread(cell.y) << 1 | spread(cell.z) << 2) << index_bits | i as u64
         })
         .collect();
     keys.par_sort_unstable();
-    keys.into_par_iter().map(|(_, i)| boxes[i as usize]).collect()
+    keys.into_par_iter().map(|key| boxes[(key & ((1 << index_bits) - 1)) as usize]).collect()
 }
 
 /// Two zero bits between each two of the low 21 bits.
