@@ -58,7 +58,7 @@ impl Above {
                 let tree = AboveTree::Binary(Bvh2::new(&topology, boxes));
                 Self { tree, depth: topology.depth(), order: topology.order }
             }
-            Layout::Wide8 => {
+            Layout::Wide8 | Layout::Compact8 => {
                 let topology = Topology::single(&relative, options.quality);
                 let wide = Wide::new(&topology, &relative, frame, Available::up_to(options.simd));
                 Self { depth: wide.depth(), tree: AboveTree::Wide(wide), order: topology.order }

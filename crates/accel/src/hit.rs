@@ -56,6 +56,8 @@ impl SurfacePoint {
 pub struct TraversalCounts {
     /// Boxes tested, in both levels.
     pub boxes: u32,
+    /// Leaves visited.
+    pub leaves: u32,
     /// Triangles and shapes tested.
     pub primitives: u32,
     /// Hits of triangles, and tests of shapes, that `f64` could not decide or not round correctly: exact numbers were

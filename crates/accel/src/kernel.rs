@@ -117,6 +117,8 @@ fn careful_plane(vertices: [Vec3; 3], ray: LocalRay, grazing: bool) -> Option<Pl
 pub(crate) trait Kernel {
     /// Boxes of instances are met as if larger by all that is rounded.
     const PADDED_ABOVE: bool = true;
+    /// Compact trees are traversed by code for closest and any hit alone, as the wide ones are.
+    const DIRECT: bool = false;
     /// What is prepared once per ray and instance.
     type Setup;
     /// Picks from eight triangles those that are worth a test.
@@ -158,6 +160,7 @@ pub(crate) struct Fast;
 
 impl Kernel for Fast {
     const PADDED_ABOVE: bool = false;
+    const DIRECT: bool = true;
     type Setup = ();
     type Filter<L: Lanes> = Plain<L>;
 
@@ -211,6 +214,7 @@ pub(crate) type Robust = RobustBy<AllGuards>;
 pub(crate) type Guarded = RobustBy<Guards>;
 
 impl<G: GuardSet> Kernel for RobustBy<G> {
+    const DIRECT: bool = true;
     type Setup = (Shear<f32>, G);
     type Filter<L: Lanes> = Either<L, G>;
 

@@ -13,21 +13,23 @@ use rayon::prelude::*;
 use crate::build::Topology;
 use crate::kernel::{Found, Kernel, double};
 use crate::layout::Bvh2;
+use crate::layout::compact8::{self, Compact8};
 use crate::layout::wide8::{self, Wide8};
 use crate::local::{Extent, LocalRay};
 use crate::normalise::common_scale;
 use crate::query::{Candidate, Closest, Collect, Collector, Dyn};
 use crate::simd::{self, Available, Lanes, Work};
-use crate::stats::{Off, Probe};
+use crate::stats::{DynProbe, Off, Probe};
 use crate::traverse::traverse;
-use crate::wide::{self, BoxRay, Visit};
+use crate::wide::{self, BoxRay, Visit, WideTree};
 use crate::{BuildError, BuildOptions, Geometry, Guards, Hit, HitId, Layout};
 
 /// The parts of one mesh, ready to be traced.
 #[derive(Clone, Debug)]
 pub(crate) struct Model {
     tree: MeshTree,
-    /// What lies at each place of the leaves: its number among all primitives in the caller's order.
+    /// What lies at each place of the leaves: its number among all primitives in the caller's order. (A compact tree
+    /// holds them itself.)
     numbers: Vec<u32>,
     /// Number of the first primitive of each geometry.
     firsts: Vec<u32>,
@@ -56,6 +58,10 @@ enum MeshTree {
     },
     Wide {
         tree: Wide8,
+        level: Available,
+    },
+    Compact {
+        tree: Compact8,
         level: Available,
     },
 }
@@ -102,7 +108,8 @@ impl Model {
     }
 
     /// Mesh number `mesh`, changed: a tree of the same shape with new boxes. Where that has no place for something -
-    /// a triangle that had no area and now has, a shape that was unbounded - it is built anew.
+    /// a triangle that had no area and now has, a shape that was unbounded - it is built anew; so are compact trees,
+    /// whose leaves have room for the vertices that they have.
     pub(crate) fn refit(
         &self,
         mesh: usize,
@@ -193,10 +200,10 @@ impl Model {
         model.extent = Extent::new(&model.bounds);
         let small = model.bounds.is_empty() || model.bounds.min.abs().max(model.bounds.max.abs()).max_element() < 4.0;
         // Shapes have no place in blocks of triangles; and products of three large numbers would overflow there.
-        let layout = if model.shapes.is_empty() && small && triangles.len() <= wide8::MOST_TRIANGLES {
-            options.layout
-        } else {
-            Layout::Bvh2
+        let layout = match options.layout {
+            _ if !(model.shapes.is_empty() && small && triangles.len() <= wide8::MOST_TRIANGLES) => Layout::Bvh2,
+            Layout::Compact8 if triangles.len() > compact8::MOST_TRIANGLES => Layout::Wide8,
+            layout => layout,
         };
         let number = |&i: &u32| numbers.get(i as usize).copied().unwrap_or(u32::MAX);
         // A place that is left empty has no number, so that whatever lies there is never hit.
@@ -226,18 +233,36 @@ impl Model {
             }
             (Layout::Wide8, _) => {
                 let topology = Topology::single(&boxes, options.quality);
-                let (tree, order) = Wide8::new(&topology, &triangles, &boxes);
+                let (tree, order) = Wide8::new(&topology, &triangles, &boxes, false);
                 model.numbers = order.iter().map(number).collect();
                 model.tree = MeshTree::Wide { tree, level: Available::up_to(options.simd) };
             }
-        }
-        for place in 0..model.numbers.len() {
-            let Some(id) = model.id(place) else { continue };
-            if let Places::Triangles(places) = &mut model.places[id.geometry as usize] {
-                places[id.primitive as usize] = place as u32;
+            (Layout::Compact8, _) => {
+                let topology = Topology::single(&boxes, options.quality);
+                let (wide, order) = Wide8::new(&topology, &triangles, &boxes, true);
+                let numbers: Vec<u32> = order.iter().map(number).collect();
+                let tree = Compact8::new(&wide, &numbers);
+                for place in tree.places() {
+                    let id = model_id(&model.firsts, tree.number(place));
+                    model.remember(place, id);
+                }
+                model.tree = MeshTree::Compact { tree, level: Available::up_to(options.simd) };
             }
         }
+        for place in 0..model.numbers.len() {
+            let id = model.id(place);
+            model.remember(place, id);
+        }
         Ok(model)
+    }
+
+    /// Where a triangle is.
+    fn remember(&mut self, place: usize, id: Option<PrimitiveId>) {
+        if let Some(id) = id
+            && let Places::Triangles(places) = &mut self.places[id.geometry as usize]
+        {
+            places[id.primitive as usize] = place as u32;
+        }
     }
 
     /// Whether a mesh has the geometries and numbers of triangles of this one.
@@ -287,12 +312,14 @@ impl Model {
         match &self.tree {
             MeshTree::Binary { depth, .. } => *depth,
             MeshTree::Wide { tree, .. } => tree.depth(),
+            MeshTree::Compact { tree, .. } => tree.depth(),
         }
     }
     pub(crate) fn sah_cost(&self) -> f64 {
         match &self.tree {
             MeshTree::Binary { tree, .. } => tree.sah_cost(),
             MeshTree::Wide { tree, .. } => tree.sah_cost(),
+            MeshTree::Compact { tree, .. } => tree.sah_cost(),
         }
     }
     pub(crate) fn degenerate(&self) -> u64 {
@@ -313,6 +340,7 @@ impl Model {
         let tree = match &self.tree {
             MeshTree::Binary { tree, triangles, .. } => tree.bytes() + size_of_val(triangles.as_slice()),
             MeshTree::Wide { tree, .. } => tree.bytes(),
+            MeshTree::Compact { tree, .. } => tree.bytes(),
         };
         tree + size_of_val(self.numbers.as_slice())
             + self.triangle_count() as usize * size_of::<u32>()
@@ -343,16 +371,18 @@ impl Model {
     fn triangle(&self, place: usize) -> Option<[Vec3; 3]> {
         match &self.tree {
             MeshTree::Binary { triangles, .. } => triangles.get(place).copied(),
-            MeshTree::Wide { tree, .. } => tree.triangle(place),
+            MeshTree::Wide { tree, .. } => Wide8::triangle(tree, place),
+            MeshTree::Compact { tree, .. } => tree.has(place).then(|| WideTree::triangle(tree, place)),
         }
     }
 
     /// The number of what lies at a place of the leaves, among all primitives in the caller's order: so ids are ordered.
+    #[inline(always)]
     pub(crate) fn number(&self, place: usize) -> Option<u32> {
-        self.numbers.get(place).copied()
+        self.numbers.get(place).copied().or_else(|| self.compact()?.0.number(place))
     }
 
-    /// Whether there is anything at a place of the leaves.
+    /// Whether there is anything at a place of the leaves (of a tree that is not compact).
     #[inline(always)]
     pub(crate) fn has(&self, place: usize) -> bool {
         self.numbers.get(place).is_some_and(|&n| n != u32::MAX)
@@ -361,14 +391,7 @@ impl Model {
     /// What lies at a place of the leaves; `None` where nothing does.
     #[inline(always)]
     pub(crate) fn id(&self, place: usize) -> Option<PrimitiveId> {
-        let number = *self.numbers.get(place)?;
-        if number == u32::MAX {
-            return None;
-        }
-        // Most meshes have one geometry.
-        let after = if self.firsts.len() == 1 { 1 } else { self.firsts.partition_point(|&f| f <= number) };
-        let geometry = after.checked_sub(1)?;
-        Some(PrimitiveId { geometry: geometry as u32, primitive: number - self.firsts[geometry] })
+        model_id(&self.firsts, self.number(place))
     }
 
     /// The surface with this id.
@@ -395,19 +418,18 @@ impl Model {
         match &self.tree {
             MeshTree::Wide { tree, level } => {
                 let kernel = PhantomData::<K>;
-                simd::run(
-                    *level,
-                    TraceWide::<SURFACES, K, C, P> {
-                        model: self,
-                        tree,
-                        transform,
-                        ray,
-                        instance,
-                        collector,
-                        probe,
-                        kernel,
-                    },
-                )
+                let of = (instance, transform);
+                let work =
+                    TraceWide::<SURFACES, Wide8, K, C, P> { model: self, tree, ray, of, collector, probe, kernel };
+                simd::run(*level, work)
+            }
+            // Compiled once for any collector and any probe.
+            MeshTree::Compact { tree, level } => {
+                let kernel = PhantomData::<K>;
+                let (of, collector, probe) = ((instance, transform), &mut Dyn(collector), &mut DynProbe(probe));
+                let work =
+                    TraceWide::<SURFACES, Compact8, K, _, _> { model: self, tree, ray, of, collector, probe, kernel };
+                simd::run(*level, work)
             }
             // Any collector through a pointer, so that this is not compiled for each. Meshes of triangles alone pay
             // nothing for shapes.
@@ -431,11 +453,17 @@ impl Model {
         if let MeshTree::Wide { tree, level } = &self.tree { Some((tree, *level)) } else { None }
     }
 
+    /// The compact tree, if that is what there is.
+    #[inline(always)]
+    pub(crate) fn compact(&self) -> Option<(&Compact8, Available)> {
+        if let MeshTree::Compact { tree, level } = &self.tree { Some((tree, *level)) } else { None }
+    }
+
     /// [`Model::trace`] by the instructions of a level.
     #[inline(always)]
-    pub(crate) fn trace_wide<L: Lanes, const SURFACES: bool, K: Kernel, C: Collector, P: Probe>(
+    pub(crate) fn trace_wide<L: Lanes, const SURFACES: bool, T: WideTree, K: Kernel, C: Collector, P: Probe>(
         &self,
-        tree: &Wide8,
+        tree: &T,
         ray: &Ray<f64>,
         (instance, transform): (u32, &Transform),
         collector: &mut C,
@@ -455,9 +483,9 @@ impl Model {
         let ordered = collector.ordered();
         let mut visitor = OfferTo { offer, collector };
         if ordered {
-            wide::traverse::<L, _, P, true>(tree, &boxes, &filter, probe, &mut visitor)
+            wide::traverse::<L, T, _, P, true>(tree, &boxes, &filter, probe, &mut visitor)
         } else {
-            wide::traverse::<L, _, P, false>(tree, &boxes, &filter, probe, &mut visitor)
+            wide::traverse::<L, T, _, P, false>(tree, &boxes, &filter, probe, &mut visitor)
         }
     }
 
@@ -696,25 +724,27 @@ impl<'a, const SURFACES: bool, K: Kernel> OfferTriangle<'a, SURFACES, K> {
     }
 }
 
-/// Traversal of the wide tree.
-struct TraceWide<'a, const SURFACES: bool, K, C, P> {
+/// Traversal of a tree of eight children a node.
+struct TraceWide<'a, const SURFACES: bool, T, K, C, P> {
     model: &'a Model,
-    tree: &'a Wide8,
-    transform: &'a Transform,
+    tree: &'a T,
     ray: &'a Ray<f64>,
-    instance: u32,
+    /// The instance.
+    of: (u32, &'a Transform),
     collector: &'a mut C,
     probe: &'a mut P,
     kernel: PhantomData<K>,
 }
 
-impl<const SURFACES: bool, K: Kernel, C: Collector, P: Probe> Work for TraceWide<'_, SURFACES, K, C, P> {
+impl<const SURFACES: bool, T: WideTree, K: Kernel, C: Collector, P: Probe> Work
+    for TraceWide<'_, SURFACES, T, K, C, P>
+{
     type Output = ControlFlow<()>;
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> ControlFlow<()> {
-        let Self { model, tree, transform, ray, instance, collector, probe, .. } = self;
-        model.trace_wide::<L, SURFACES, K, C, P>(tree, ray, (instance, transform), collector, probe)
+        let Self { model, tree, ray, of, collector, probe, .. } = self;
+        model.trace_wide::<L, SURFACES, T, K, C, P>(tree, ray, of, collector, probe)
     }
 }
 
@@ -761,6 +791,16 @@ fn has_no_area(vertices: [Vec3; 3]) -> bool {
     // Far more than what is rounded here: with an angle like this, no way to compute it gives 0.
     let certainly = e1.cross(e2).length_squared() > 1e-20 * (e1.length_squared() * e2.length_squared());
     !certainly && triangle::area_vector([a, b, c]) == DVec3::ZERO
+}
+
+/// Which primitive has a number (or none, `u32::MAX`): `firsts` are those of the geometries.
+#[inline(always)]
+fn model_id(firsts: &[u32], number: Option<u32>) -> Option<PrimitiveId> {
+    let number = number.filter(|&n| n != u32::MAX)?;
+    // Most meshes have one geometry.
+    let after = if firsts.len() == 1 { 1 } else { firsts.partition_point(|&f| f <= number) };
+    let geometry = after.checked_sub(1)?;
+    Some(PrimitiveId { geometry: geometry as u32, primitive: number - firsts[geometry] })
 }
 
 /// Boxes for the builder, whose areas must not overflow: only the shape of the tree comes from them.

@@ -11,7 +11,8 @@ impl Scene {
     /// which is quicker than building. This scene stays as it is, and shares all other meshes with the new one.
     ///
     /// Answers are those of a scene built anew; only the time they take may differ: the more the mesh differs from the
-    /// one that was built, the more boxes overlap. Where triangles without area or unbounded shapes are left out of a
+    /// one that was built, the more boxes overlap. Meshes of the layout [`Compact8`](crate::Layout::Compact8) are built
+    /// anew. Where triangles without area or unbounded shapes are left out of a
     /// tree and now belong there, the mesh is built anew. The tree over the instances always is.
     ///
     /// ```

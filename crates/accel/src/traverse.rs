@@ -26,6 +26,7 @@ pub(crate) fn traverse<const PADDED: bool, R: Real, T: Tree<R>, P: Probe>(
     let mut stack = Stack::new();
     loop {
         if current.is_leaf() {
+            probe.leaf();
             t_max = leaf(current.range(), probe)?;
         } else {
             probe.boxes(2);

@@ -104,7 +104,12 @@ fn agree_in_scenes(options: BuildOptions, count: u64) {
         let indices = (0..corners.len() as u32).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
         let mesh = Mesh { positions: corners.as_flattened().to_vec(), triangles: indices };
         let places = placed(size, &mut rng);
-        let ways = [(Layout::Bvh2, Level::Scalar), (Layout::Wide8, Level::Scalar), (Layout::Wide8, Level::default())];
+        let ways = [
+            (Layout::Bvh2, Level::Scalar),
+            (Layout::Wide8, Level::Scalar),
+            (Layout::Wide8, Level::default()),
+            (Layout::Compact8, Level::default()),
+        ];
         let scenes = ways.map(|(layout, simd)| {
             let mut builder = SceneBuilder::new(BuildOptions { layout, simd, ..options });
             let m = builder.add_mesh(vec![triangles(&mesh)]);

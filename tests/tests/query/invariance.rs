@@ -98,12 +98,14 @@ fn layouts_and_instructions_answer_alike() {
     for mesh in meshes.iter().flatten() {
         let rays = aimed(mesh, 3000);
         for precision in careful() {
-            let answers = |layout, simd| {
+            let answers = |layout, simd, instances| {
                 let mut builder =
                     SceneBuilder::new(BuildOptions { layout, simd, precision, ..BuildOptions::default() });
                 let m = builder.add_mesh(vec![triangles(mesh)]);
                 builder.add_instance(m, DAffine3::IDENTITY);
-                builder.add_instance(m, DAffine3::from_scale(DVec3::splat(0.7)));
+                if instances > 1 {
+                    builder.add_instance(m, DAffine3::from_scale(DVec3::splat(0.7)));
+                }
                 let scene = builder.build().expect("a good mesh");
                 let answer = |r: &Ray<f64>| {
                     let line = r.with_interval(f64::NEG_INFINITY, f64::INFINITY);
@@ -116,10 +118,14 @@ fn layouts_and_instructions_answer_alike() {
                 };
                 rays.iter().map(answer).collect::<Vec<_>>()
             };
-            let first = answers(Layout::Bvh2, Level::Scalar);
-            for level in Level::ALL {
-                let same = answers(Layout::Wide8, level) == first;
-                assert!(same, "{precision} {level}");
+            for instances in [1, 2] {
+                let first = answers(Layout::Bvh2, Level::Scalar, instances);
+                for layout in [Layout::Wide8, Layout::Compact8] {
+                    for level in Level::ALL {
+                        let same = answers(layout, level, instances) == first;
+                        assert!(same, "{precision} {layout:?} {level}, {instances}");
+                    }
+                }
             }
         }
     }

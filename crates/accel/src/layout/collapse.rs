@@ -10,6 +10,7 @@ use firsthit_geometry::Aabb;
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::compact8::fits;
 use super::wide8::{Block, Node, Reference, Wide8, leaf_cost};
 use crate::build::{Child, Topology};
 
@@ -44,7 +45,8 @@ impl Plan {
         Self { cost: [leaf_cost(count) * area; 8], left: [0; 8] }
     }
 
-    fn inner(area: f32, count: u32, l: &Self, r: &Self) -> Self {
+    /// `leaf`: whether its primitives may be one.
+    fn inner(area: f32, count: u32, leaf: bool, l: &Self, r: &Self) -> Self {
         let mut plan = Self::NONE;
         // Shown as j + 1 children: at least one to each side.
         let split = |j: usize| {
@@ -54,7 +56,7 @@ impl Plan {
         };
         let (below, left) = split(7);
         let inner = area + below;
-        let leaf = if count <= LEAF { leaf_cost(count) * area } else { f32::INFINITY };
+        let leaf = if leaf { leaf_cost(count) * area } else { f32::INFINITY };
         (plan.cost[0], plan.left[0]) = if leaf <= inner { (leaf, 0) } else { (inner, left) };
         for j in 1..8 {
             let (cost, left) = split(j);
@@ -70,12 +72,23 @@ struct Source<'a> {
     topology: &'a Topology,
     triangles: &'a [[Vec3; 3]],
     boxes: &'a [Aabb<f32>],
+    /// Leaves have few different vertices too: for [`Compact8`](super::compact8::Compact8).
+    few_vertices: bool,
 }
 
 impl Source<'_> {
     fn leaf_bounds(&self, leaf: Child) -> Aabb<f32> {
         let run = &self.topology.order[leaf.range()];
         run.iter().fold(Aabb::empty(), |b, &p| b.union(self.boxes[p as usize]))
+    }
+
+    /// Whether so many primitives, from one in the order, may be a leaf.
+    fn may_be_leaf(&self, first: u32, count: u32) -> bool {
+        if count > LEAF || !self.few_vertices {
+            return count <= LEAF;
+        }
+        let run = &self.topology.order[first as usize..(first + count) as usize];
+        fits(run.iter().map(|&p| self.triangles[p as usize]))
     }
 
     /// Index past the last node of each node's subtree: nodes lie depth first, so it is what lies between.
@@ -113,7 +126,7 @@ impl Source<'_> {
         };
         let bounds = l.bounds.union(r.bounds);
         let count = l.count + r.count;
-        let plan = Plan::inner(bounds.area(), count, &l.plan, &r.plan);
+        let plan = Plan::inner(bounds.area(), count, self.may_be_leaf(l.first, count), &l.plan, &r.plan);
         here[0] = Inner { bounds, first: l.first, count, plan };
         here[0]
     }
@@ -272,8 +285,15 @@ impl Wide8 {
     /// the threads of the rayon pool it is called from; the same tree for any number.
     ///
     /// Tells also which triangle is in each lane of each block; `u32::MAX` stands for none.
-    pub(crate) fn new(topology: &Topology, triangles: &[[Vec3; 3]], boxes: &[Aabb<f32>]) -> (Self, Vec<u32>) {
-        let source = Source { topology, triangles, boxes };
+    ///
+    /// `few_vertices`: no leaf has more different vertices than one of [`Compact8`](super::compact8::Compact8) may have.
+    pub(crate) fn new(
+        topology: &Topology,
+        triangles: &[[Vec3; 3]],
+        boxes: &[Aabb<f32>],
+        few_vertices: bool,
+    ) -> (Self, Vec<u32>) {
+        let source = Source { topology, triangles, boxes, few_vertices };
         let Some(root) = topology.root else { return (Self::default(), Vec::new()) };
         let nothing = Inner { bounds: Aabb::empty(), first: 0, count: 0, plan: Plan::NONE };
         let mut inner = vec![nothing; topology.nodes.len()];

@@ -5,6 +5,7 @@
 
 mod bvh2;
 mod collapse;
+pub(crate) mod compact8;
 pub(crate) mod wide8;
 
 pub(crate) use bvh2::Bvh2;

@@ -10,6 +10,9 @@ use core::ops::Range;
 use firsthit_geometry::Aabb;
 use glam::Vec3;
 
+use crate::simd::Lanes;
+use crate::wide::{Axis, BoxNode, Leaf, WideTree};
+
 /// A tree of eight children a node.
 #[derive(Clone, Debug)]
 pub(crate) struct Wide8 {
@@ -40,7 +43,7 @@ impl Reference {
     pub(super) fn node(index: usize) -> Self {
         Self(index as u32)
     }
-    pub(super) fn leaf(place: usize, count: usize) -> Self {
+    pub(crate) fn leaf(place: usize, count: usize) -> Self {
         Self(Self::LEAF | (count as u32 - 1) << 28 | (place as u32 & 3) << 26 | (place / 4) as u32)
     }
     /// The same after so many nodes or blocks more.
@@ -66,7 +69,7 @@ impl Reference {
         (self.0 & (MOST_BLOCKS - 1)) as usize
     }
     /// Of a leaf: where its triangles are, `4 * block + lane`.
-    fn places(self) -> Range<usize> {
+    pub(super) fn places(self) -> Range<usize> {
         let first = self.block() * 4 + (self.0 >> 26 & 3) as usize;
         first..first + self.lanes().count_ones() as usize
     }
@@ -129,9 +132,9 @@ impl Node {
 pub(crate) struct Block(pub(crate) [[[f32; 4]; 3]; 3]);
 
 impl Block {
-    pub(super) const EMPTY: Self = Self([[[f32::NAN; 4]; 3]; 3]);
+    pub(crate) const EMPTY: Self = Self([[[f32::NAN; 4]; 3]; 3]);
 
-    pub(super) fn set_triangle(&mut self, lane: usize, triangle: [Vec3; 3]) {
+    pub(crate) fn set_triangle(&mut self, lane: usize, triangle: [Vec3; 3]) {
         for (vertex, p) in triangle.iter().enumerate() {
             for axis in 0..3 {
                 self.0[vertex][axis][lane] = p[axis];
@@ -206,10 +209,83 @@ impl Wide8 {
         size_of_val(self.nodes.as_slice()) + size_of_val(self.blocks.as_slice())
     }
 
-    /// The triangle at a place, `4 * block + lane`.
+    /// The triangle at a place, `4 * block + lane`, if there is such a place.
     #[inline(always)]
     pub(crate) fn triangle(&self, place: usize) -> Option<[Vec3; 3]> {
         self.blocks.get(place / 4).map(|b| b.triangle(place % 4))
+    }
+}
+
+impl WideTree for Wide8 {
+    type Node = Node;
+    type Leaf<'a> = Blocks<'a>;
+
+    #[inline(always)]
+    fn root(&self) -> Reference {
+        self.root
+    }
+
+    #[inline(always)]
+    fn node(&self, at: Reference) -> &Node {
+        &self.nodes[at.index()]
+    }
+
+    #[inline(always)]
+    fn leaf(&self, at: Reference) -> Blocks<'_> {
+        let (index, lanes) = (at.block(), at.lanes());
+        // Where one block is enough, no other is fetched.
+        let high = index + usize::from(lanes > 0xf);
+        Blocks { index, low: &self.blocks[index], high: &self.blocks[high], lanes }
+    }
+
+    #[inline(always)]
+    fn triangle(&self, place: usize) -> [Vec3; 3] {
+        self.blocks[place / 4].triangle(place)
+    }
+}
+
+impl BoxNode for Node {
+    #[inline(always)]
+    fn children(&self) -> &[u32; 8] {
+        &self.children
+    }
+
+    #[inline(always)]
+    fn slabs<L: Lanes>(&self, _: usize, ray: &Axis<L>) -> (L, L) {
+        let enter = L::load_row(&self.planes, ray.entry).mul_sub(ray.inverse, ray.near);
+        let leave = L::load_row(&self.planes, ray.exit).mul_sub(ray.inverse, ray.far);
+        (enter, leave)
+    }
+
+    #[inline(always)]
+    fn there(&self, hits: u32) -> u32 {
+        hits
+    }
+}
+
+/// The triangles of a leaf: those of two blocks, of which some lanes count.
+#[derive(Clone, Copy)]
+pub(crate) struct Blocks<'a> {
+    index: usize,
+    low: &'a Block,
+    high: &'a Block,
+    lanes: u32,
+}
+
+impl Leaf for Blocks<'_> {
+    #[inline(always)]
+    fn lanes(&self) -> u32 {
+        self.lanes
+    }
+
+    #[inline(always)]
+    fn place(&self, lane: usize) -> usize {
+        self.index * 4 + lane
+    }
+
+    #[inline(always)]
+    fn load<L: Lanes>(&self, vertex: usize, axis: usize) -> L {
+        L::load_halves(&self.low.0[vertex][axis], &self.high.0[vertex][axis])
     }
 }
 
@@ -222,13 +298,13 @@ mod tests {
     fn check(triangles: &[[Vec3; 3]]) {
         let boxes: Vec<_> = triangles.iter().map(|t| Aabb::from_points(*t)).collect();
         let topology = Topology::single(&boxes, BuildQuality::Balanced);
-        let (tree, order) = Wide8::new(&topology, triangles, &boxes);
+        let (tree, order) = Wide8::new(&topology, triangles, &boxes, false);
         let mut seen: Vec<u32> = order.iter().copied().filter(|&p| p != u32::MAX).collect();
         seen.sort_unstable();
         assert_eq!(seen, (0..triangles.len() as u32).collect::<Vec<_>>(), "every triangle in one lane");
         assert!(order.len() == tree.blocks.len() * 4);
         for (place, &p) in order.iter().enumerate() {
-            let t = tree.triangle(place).unwrap();
+            let t = Wide8::triangle(&tree, place).unwrap();
             assert_eq!(triangles.get(p as usize).copied(), (!t[0].x.is_nan()).then_some(t));
         }
         // Boxes of children hold what lies below, in leaves that have no triangle in common.
@@ -297,7 +373,7 @@ mod tests {
         let topology = Topology::single(&boxes, BuildQuality::Balanced);
         let trees = [1, 3].map(|threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            let (tree, order) = pool.install(|| Wide8::new(&topology, &triangles, &boxes));
+            let (tree, order) = pool.install(|| Wide8::new(&topology, &triangles, &boxes, false));
             let nodes: Vec<_> =
                 tree.nodes.iter().map(|n| (n.planes.map(|p| p.map(f32::to_bits)), n.children)).collect();
             (tree.root, nodes, order)

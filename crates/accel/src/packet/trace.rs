@@ -9,7 +9,7 @@ use super::tier::{Known, Tier, Way};
 use crate::layout::wide8::{Reference, Wide8};
 use crate::model::Model;
 use crate::simd::{Eight, Lanes, Stack};
-use crate::wide::{Filter, Leaf};
+use crate::wide::{Filter, WideTree};
 
 /// The mesh that a packet goes through, and its rays.
 #[derive(Clone, Copy)]
@@ -80,7 +80,7 @@ pub(super) fn trace<L: Lanes, T: Tier, const ANY: bool>(among: &Among<'_>, group
                 break reference.index();
             }
             let (block, lanes) = (reference.block(), reference.lanes());
-            let leaf = Leaf { low: &tree.blocks[block], high: &tree.blocks[block + usize::from(lanes > 0xf)], lanes };
+            let leaf = tree.leaf(reference);
             let mut shortened = false;
             for (g, group) in groups.iter_mut().enumerate() {
                 let rays = group.meet::<L>(parent, child, way.negative);

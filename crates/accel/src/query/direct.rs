@@ -8,12 +8,14 @@ use firsthit_geometry::{Precision, Ray, transform::Transform};
 
 use super::{Any, Closest, Collect, Collector};
 use crate::kernel::{Double, Exact, Fast, Guarded, Kernel, Robust};
+use crate::layout::compact8::Compact8;
 use crate::layout::wide8::Wide8;
 use crate::model::Model;
 use crate::packet::{self, Packet, Tier};
 use crate::scene::{Inner, is_interval};
 use crate::simd::{self, Available, Lanes, Work};
 use crate::stats::Off;
+use crate::wide::WideTree;
 use crate::{Guards, Hit, Scene};
 
 /// The guards that the tier `Robust` has in queries.
@@ -87,7 +89,10 @@ impl ForKernel for ClosestHit<'_> {
     fn run<K: Kernel>(self) -> Option<Hit> {
         let Self { scene, ray } = self;
         if let Some((level, only)) = scene.inner().only() {
-            return simd::run(level, ClosestHitOf::<K> { only, scene, ray, kernel: PhantomData });
+            return simd::run(level, ClosestHitOf::<_, K> { only, scene, ray, kernel: PhantomData });
+        }
+        if let Some((level, only)) = scene.inner().only_compact::<K>() {
+            return simd::run(level, ClosestHitOf::<_, K> { only, scene, ray, kernel: PhantomData });
         }
         closest::<K>(scene, ray)
     }
@@ -106,7 +111,10 @@ impl ForKernel for AnyHit<'_> {
     fn run<K: Kernel>(self) -> bool {
         let Self { scene, ray } = self;
         if let Some((level, only)) = scene.inner().only() {
-            return simd::run(level, AnyHitOf::<K> { only, ray, kernel: PhantomData });
+            return simd::run(level, AnyHitOf::<_, K> { only, ray, kernel: PhantomData });
+        }
+        if let Some((level, only)) = scene.inner().only_compact::<K>() {
+            return simd::run(level, AnyHitOf::<_, K> { only, ray, kernel: PhantomData });
         }
         any::<K>(scene, ray)
     }
@@ -141,7 +149,10 @@ impl ForKernel for ClosestHits<'_> {
     fn run<K: Kernel>(self) {
         let Self { scene, rays, hits } = self;
         if let Some((level, only)) = scene.inner().only() {
-            return simd::run(level, ClosestHitsOf::<K> { only, scene, rays, hits, kernel: PhantomData });
+            return simd::run(level, ClosestHitsOf::<_, K> { only, scene, rays, hits, kernel: PhantomData });
+        }
+        if let Some((level, only)) = scene.inner().only_compact::<K>() {
+            return simd::run(level, ClosestHitsOf::<_, K> { only, scene, rays, hits, kernel: PhantomData });
         }
         for (ray, hit) in rays.iter().zip(hits) {
             *hit = closest::<K>(scene, ray);
@@ -163,7 +174,10 @@ impl ForKernel for AnyHits<'_> {
     fn run<K: Kernel>(self) {
         let Self { scene, rays, hits } = self;
         if let Some((level, only)) = scene.inner().only() {
-            return simd::run(level, AnyHitsOf::<K> { only, rays, hits, kernel: PhantomData });
+            return simd::run(level, AnyHitsOf::<_, K> { only, rays, hits, kernel: PhantomData });
+        }
+        if let Some((level, only)) = scene.inner().only_compact::<K>() {
+            return simd::run(level, AnyHitsOf::<_, K> { only, rays, hits, kernel: PhantomData });
         }
         for (ray, hit) in rays.iter().zip(hits) {
             *hit = any::<K>(scene, ray);
@@ -171,22 +185,23 @@ impl ForKernel for AnyHits<'_> {
     }
 }
 
-/// The only instance of a scene, of a model with a wide tree: there is nothing above it to be traversed.
+/// The only instance of a scene, of a model with a wide tree (or a compact one): there is nothing above it to be
+/// traversed.
 #[derive(Clone, Copy)]
-struct Only<'a> {
+struct Only<'a, T> {
     model: &'a Model,
-    tree: &'a Wide8,
+    tree: &'a T,
     transform: &'a Transform,
 }
 
-impl Only<'_> {
+impl<T: WideTree> Only<'_, T> {
     #[inline(always)]
     fn trace<L: Lanes, K: Kernel, C: Collector>(&self, ray: &Ray<f64>, collector: &mut C) -> ControlFlow<()> {
         // What is not finite is found out on entering the mesh.
         if !is_interval(ray) {
             return ControlFlow::Continue(());
         }
-        self.model.trace_wide::<L, false, K, C, Off>(self.tree, ray, (0, self.transform), collector, &mut Off)
+        self.model.trace_wide::<L, false, T, K, C, Off>(self.tree, ray, (0, self.transform), collector, &mut Off)
     }
 
     #[inline(always)]
@@ -206,14 +221,14 @@ impl Only<'_> {
 }
 
 /// [`ClosestHit`] in the only instance.
-struct ClosestHitOf<'a, K> {
-    only: Only<'a>,
+struct ClosestHitOf<'a, T, K> {
+    only: Only<'a, T>,
     scene: &'a Scene,
     ray: &'a Ray<f64>,
     kernel: PhantomData<K>,
 }
 
-impl<K: Kernel> Work for ClosestHitOf<'_, K> {
+impl<T: WideTree, K: Kernel> Work for ClosestHitOf<'_, T, K> {
     type Output = Option<Hit>;
 
     #[inline(always)]
@@ -223,13 +238,13 @@ impl<K: Kernel> Work for ClosestHitOf<'_, K> {
 }
 
 /// [`AnyHit`] in the only instance.
-struct AnyHitOf<'a, K> {
-    only: Only<'a>,
+struct AnyHitOf<'a, T, K> {
+    only: Only<'a, T>,
     ray: &'a Ray<f64>,
     kernel: PhantomData<K>,
 }
 
-impl<K: Kernel> Work for AnyHitOf<'_, K> {
+impl<T: WideTree, K: Kernel> Work for AnyHitOf<'_, T, K> {
     type Output = bool;
 
     #[inline(always)]
@@ -239,15 +254,15 @@ impl<K: Kernel> Work for AnyHitOf<'_, K> {
 }
 
 /// [`ClosestHits`] in the only instance.
-struct ClosestHitsOf<'a, K> {
-    only: Only<'a>,
+struct ClosestHitsOf<'a, T, K> {
+    only: Only<'a, T>,
     scene: &'a Scene,
     rays: &'a [Ray<f64>],
     hits: &'a mut [Option<Hit>],
     kernel: PhantomData<K>,
 }
 
-impl<K: Kernel> Work for ClosestHitsOf<'_, K> {
+impl<T: WideTree, K: Kernel> Work for ClosestHitsOf<'_, T, K> {
     type Output = ();
 
     #[inline(always)]
@@ -261,7 +276,7 @@ impl<K: Kernel> Work for ClosestHitsOf<'_, K> {
 
 /// [`ClosestHits`] in the only instance, in packets where rays suit each other.
 struct ClosestInPackets<'a, T> {
-    only: Only<'a>,
+    only: Only<'a, Wide8>,
     scene: &'a Scene,
     rays: &'a [Ray<f64>],
     hits: &'a mut [Option<Hit>],
@@ -294,7 +309,7 @@ impl<T: Tier> Work for ClosestInPackets<'_, T> {
 
 /// [`AnyHits`] in the only instance, likewise.
 struct AnyInPackets<'a, T> {
-    only: Only<'a>,
+    only: Only<'a, Wide8>,
     rays: &'a [Ray<f64>],
     hits: &'a mut [bool],
     kernel: PhantomData<T>,
@@ -325,14 +340,14 @@ impl<T: Tier> Work for AnyInPackets<'_, T> {
 }
 
 /// [`AnyHits`] in the only instance.
-struct AnyHitsOf<'a, K> {
-    only: Only<'a>,
+struct AnyHitsOf<'a, T, K> {
+    only: Only<'a, T>,
     rays: &'a [Ray<f64>],
     hits: &'a mut [bool],
     kernel: PhantomData<K>,
 }
 
-impl<K: Kernel> Work for AnyHitsOf<'_, K> {
+impl<T: WideTree, K: Kernel> Work for AnyHitsOf<'_, T, K> {
     type Output = ();
 
     #[inline(always)]
@@ -357,10 +372,22 @@ impl Inner {
     }
 
     #[inline(always)]
-    fn only(&self) -> Option<(Available, Only<'_>)> {
+    fn only(&self) -> Option<(Available, Only<'_, Wide8>)> {
         let [instance] = &self.instances[..] else { return None };
         let model = &self.models[instance.model as usize];
         let (tree, level) = model.wide()?;
+        Some((level, Only { model, tree, transform: &instance.transform }))
+    }
+
+    /// The same of a compact tree; for the tiers that are asked most alone, so that not everything is compiled twice.
+    #[inline(always)]
+    fn only_compact<K: Kernel>(&self) -> Option<(Available, Only<'_, Compact8>)> {
+        if !K::DIRECT {
+            return None;
+        }
+        let [instance] = &self.instances[..] else { return None };
+        let model = &self.models[instance.model as usize];
+        let (tree, level) = model.compact()?;
         Some((level, Only { model, tree, transform: &instance.transform }))
     }
 }

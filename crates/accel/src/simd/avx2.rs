@@ -45,6 +45,21 @@ static LANES: [[u8; 8]; 256] = {
 impl Lanes for Avx2 {
     super::ymm::ymm!();
     #[inline(always)]
+    fn look_up(words: &[u32; 8], vertex: usize, table: &[u32; 16]) -> Self {
+        unsafe {
+            let words = _mm256_loadu_si256(words.as_ptr().cast());
+            let index = match vertex {
+                0 => words,
+                1 => _mm256_srli_epi32::<4>(words),
+                _ => _mm256_srli_epi32::<8>(words),
+            };
+            // The low three bits count.
+            let low = _mm256_permutevar8x32_ps(_mm256_loadu_ps(table.as_ptr().cast()), index);
+            let high = _mm256_permutevar8x32_ps(_mm256_loadu_ps(table.as_ptr().add(8).cast()), index);
+            Self(_mm256_blendv_ps(low, high, _mm256_castsi256_ps(_mm256_slli_epi32::<28>(index))))
+        }
+    }
+    #[inline(always)]
     fn le(self, o: Self) -> u32 {
         unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, o.0)) as u32 }
     }

@@ -23,6 +23,20 @@ pub(super) unsafe fn run<W: Work>(work: W) -> W::Output {
 impl Lanes for Avx512 {
     super::ymm::ymm!();
     #[inline(always)]
+    fn look_up(words: &[u32; 8], vertex: usize, table: &[u32; 16]) -> Self {
+        unsafe {
+            let words = _mm256_loadu_si256(words.as_ptr().cast());
+            let index = match vertex {
+                0 => words,
+                1 => _mm256_srli_epi32::<4>(words),
+                _ => _mm256_srli_epi32::<8>(words),
+            };
+            let (low, high) = (_mm256_loadu_ps(table.as_ptr().cast()), _mm256_loadu_ps(table.as_ptr().add(8).cast()));
+            // The low four bits count.
+            Self(_mm256_permutex2var_ps(low, index, high))
+        }
+    }
+    #[inline(always)]
     fn le(self, o: Self) -> u32 {
         unsafe { u32::from(_mm256_cmp_ps_mask::<_CMP_LE_OQ>(self.0, o.0)) }
     }

@@ -1,8 +1,8 @@
 //! Eight numbers at a time: the only room with `unsafe`.
 //!
 //! [`Lanes`] is what a traversal is written over; [`Portable`] is its meaning, in plain Rust, and every other form must
-//! give the same bits (there is a test), but for [`Lanes::mul_sub`], which may round once or twice and so has its place
-//! in conservative tests only. [`run`] enters a function compiled for a [`Level`], chosen once per query.
+//! give the same bits (there is a test), but for [`Lanes::mul_sub`] and [`Lanes::mul_add`], which may round once or twice and so
+//! have their place in conservative tests only. [`run`] enters a function compiled for a [`Level`], chosen once per query.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
@@ -99,6 +99,11 @@ pub(crate) trait Lanes: Packed {
     fn load_row(rows: &[[f32; 8]; 6], row: Row) -> Self;
     /// The lower four lanes from one place, the upper four from another.
     fn load_halves(low: &[f32; 4], high: &[f32; 4]) -> Self;
+    /// One of the rows, of whole numbers.
+    fn load_bytes(rows: &[[u8; 8]; 6], row: Row) -> Self;
+    /// For each lane the number whose bits are in the table, at the index that is in the word's low four bits once it is
+    /// shifted by four times `vertex`, which is 0, 1 or 2.
+    fn look_up(words: &[u32; 8], vertex: usize, table: &[u32; 16]) -> Self;
     fn store(self) -> [f32; 8];
     fn add(self, o: Self) -> Self;
     fn sub(self, o: Self) -> Self;
@@ -106,6 +111,8 @@ pub(crate) trait Lanes: Packed {
     fn div(self, o: Self) -> Self;
     /// `self * b - c`, rounded once or twice.
     fn mul_sub(self, b: Self, c: Self) -> Self;
+    /// `self * b + c`, rounded once or twice.
+    fn mul_add(self, b: Self, c: Self) -> Self;
     /// The smaller; `o` where one is NaN.
     fn min(self, o: Self) -> Self;
     /// The larger; `o` where one is NaN.

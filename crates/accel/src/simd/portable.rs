@@ -37,6 +37,22 @@ impl Lanes for Portable {
         Self([a, b, c, d, e, f, g, h])
     }
     #[inline(always)]
+    fn load_bytes(rows: &[[u8; 8]; 6], row: Row) -> Self {
+        let mut out = [0.0; 8];
+        for k in 0..8 {
+            out[k] = f32::from(rows[row.0 / 8][k]);
+        }
+        Self(out)
+    }
+    #[inline(always)]
+    fn look_up(words: &[u32; 8], vertex: usize, table: &[u32; 16]) -> Self {
+        let mut out = [0.0; 8];
+        for k in 0..8 {
+            out[k] = f32::from_bits(table[(words[k] >> (4 * vertex) & 15) as usize]);
+        }
+        Self(out)
+    }
+    #[inline(always)]
     fn store(self) -> [f32; 8] {
         self.0
     }
@@ -59,6 +75,10 @@ impl Lanes for Portable {
     #[inline(always)]
     fn mul_sub(self, b: Self, c: Self) -> Self {
         self.mul(b).sub(c)
+    }
+    #[inline(always)]
+    fn mul_add(self, b: Self, c: Self) -> Self {
+        self.mul(b).add(c)
     }
     #[inline(always)]
     fn min(self, o: Self) -> Self {

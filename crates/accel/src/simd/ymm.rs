@@ -47,6 +47,16 @@ macro_rules! ymm {
             unsafe { Self(_mm256_fmsub_ps(self.0, b.0, c.0)) }
         }
         #[inline(always)]
+        fn mul_add(self, b: Self, c: Self) -> Self {
+            unsafe { Self(_mm256_fmadd_ps(self.0, b.0, c.0)) }
+        }
+        #[inline(always)]
+        fn load_bytes(rows: &[[u8; 8]; 6], row: Row) -> Self {
+            // SAFETY: a `Row` is the start of one of six times eight numbers.
+            let row = unsafe { _mm_loadl_epi64(rows.as_ptr().cast::<u8>().add(row.0).cast()) };
+            unsafe { Self(_mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(row))) }
+        }
+        #[inline(always)]
         fn min(self, o: Self) -> Self {
             unsafe { Self(_mm256_min_ps(self.0, o.0)) }
         }

@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use crate::layout::wide8::Node;
 use crate::simd::{Lanes, Row};
+use crate::wide::BoxNode;
 
 /// Reciprocals are kept finite, so that no product is NaN: a direction component smaller than this bends the ray by
 /// less than the slack in the boxes' padding.
@@ -18,28 +19,16 @@ pub(crate) struct Boxes<L> {
     axes: [Axis<L>; 3],
 }
 
-/// The planes of one axis.
+/// The ray along one axis.
 #[derive(Clone, Copy)]
-struct Axis<L> {
+pub(crate) struct Axis<L> {
     /// The planes where the ray enters, and where it leaves.
-    entry: Row,
-    exit: Row,
-    inverse: L,
+    pub(crate) entry: Row,
+    pub(crate) exit: Row,
+    pub(crate) inverse: L,
     /// The origin times the reciprocal, for either.
-    near: L,
-    far: L,
-}
-
-impl<L: Lanes> Axis<L> {
-    #[inline(always)]
-    fn enter(&self, node: &Node) -> L {
-        L::load_row(&node.planes, self.entry).mul_sub(self.inverse, self.near)
-    }
-
-    #[inline(always)]
-    fn leave(&self, node: &Node) -> L {
-        L::load_row(&node.planes, self.exit).mul_sub(self.inverse, self.far)
-    }
+    pub(crate) near: L,
+    pub(crate) far: L,
 }
 
 impl<L: Lanes> Boxes<L> {
@@ -61,11 +50,11 @@ impl<L: Lanes> Boxes<L> {
 
     /// Which children the ray meets within `[t_min, t_max]`, and where it enters them.
     #[inline(always)]
-    pub(crate) fn test(&self, node: &Node, t_min: L, t_max: L) -> (u32, L) {
-        let [x, y, z] = &self.axes;
-        let enter = x.enter(node).max(y.enter(node)).max(z.enter(node).max(t_min));
-        let leave = x.leave(node).min(y.leave(node)).min(z.leave(node).min(t_max));
-        (enter.le(leave), enter)
+    pub(crate) fn test(&self, node: &impl BoxNode, t_min: L, t_max: L) -> (u32, L) {
+        let [x, y, z] = [node.slabs(0, &self.axes[0]), node.slabs(1, &self.axes[1]), node.slabs(2, &self.axes[2])];
+        let enter = x.0.max(y.0).max(z.0.max(t_min));
+        let leave = x.1.min(y.1).min(z.1.min(t_max));
+        (node.there(enter.le(leave)), enter)
     }
 }
 
@@ -94,6 +83,7 @@ impl AxisOf<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::layout::compact8;
     use crate::simd::{Available, Level, Work, run};
     use firsthit_geometry::Aabb;
     use proptest::prelude::*;
@@ -113,13 +103,21 @@ mod tests {
             // 4u|o|, and 4u of the farthest that a plane may be.
             let delta = if self.padded { (self.origin.abs().max_element() + 50.0) * 2.4e-7 } else { 0.0 };
             let boxes = Boxes::<L>::new(self.origin, self.direction, delta);
-            boxes.test(self.node, L::splat(self.t_min), L::splat(f32::INFINITY)).0
+            let (t_min, t_max) = (L::splat(self.t_min), L::splat(f32::INFINITY));
+            let compact = boxes.test(&compact8::Node::new(self.node), t_min, t_max).0;
+            let wide = boxes.test(self.node, t_min, t_max).0;
+            // Those of the grid are never smaller (where nothing is rounded: powers of two are multiples of steps).
+            assert!(!self.padded || wide & !compact == 0);
+            wide | compact << 8
         }
     }
 
     fn node(boxes: &[Aabb<f32>]) -> Node {
         let mut node = Node::EMPTY;
-        boxes.iter().enumerate().for_each(|(k, b)| node.set_box(k, b));
+        for (k, b) in boxes.iter().enumerate() {
+            node.set_box(k, b);
+            node.children[k] = k as u32;
+        }
         node
     }
 
@@ -147,6 +145,7 @@ mod tests {
                 for (padded, t_min) in [(true, 0.0), (true, f32::NEG_INFINITY), (false, 0.0), (false, -1.0)] {
                     let test = Test { node: &node, origin, direction, padded, t_min };
                     let hits = run(Available::up_to(level), test);
+                    let all = all | all << 8;
                     prop_assert_eq!(hits & !all, 0, "{} missing children are met", level);
                     prop_assert!(!padded || hits == all, "{} {:b}", level, hits);
                 }

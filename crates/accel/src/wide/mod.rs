@@ -1,16 +1,18 @@
 //! Traversal of the wide tree, written once for all tiers, queries and processors.
 
 mod boxes;
+mod tree;
 mod triangles;
 
 use core::ops::ControlFlow;
 
 use glam::Vec3;
 
-pub(crate) use boxes::{Boxes, SMALLEST};
-pub(crate) use triangles::{Either, Filter, Leaf, Margin, Plain, Sheared};
+pub(crate) use boxes::{Axis, Boxes, SMALLEST};
+pub(crate) use tree::{BoxNode, Leaf, WideTree};
+pub(crate) use triangles::{Either, Filter, Margin, Plain, Sheared};
 
-use crate::layout::wide8::{Reference, Wide8};
+use crate::layout::wide8::Reference;
 use crate::simd::{Lanes, Stack};
 use crate::stats::Probe;
 
@@ -44,14 +46,14 @@ pub(crate) trait Visit<P> {
 /// The visitor gets each triangle that passes the filter. Boxes that begin *beyond* the end are skipped; those that begin
 /// at it are visited, so that triangles at equal distance are all seen.
 #[inline(always)]
-pub(crate) fn traverse<L: Lanes, F: Filter<L>, P: Probe, const ORDERED: bool>(
-    tree: &Wide8,
+pub(crate) fn traverse<L: Lanes, T: WideTree, F: Filter<L>, P: Probe, const ORDERED: bool>(
+    tree: &T,
     ray: &BoxRay,
     filter: &F,
     probe: &mut P,
     visitor: &mut impl Visit<P>,
 ) -> ControlFlow<()> {
-    if tree.root == Reference::NOTHING {
+    if tree.root() == Reference::NOTHING {
         return ControlFlow::Continue(());
     }
     let boxes = Boxes::<L>::new(ray.origin, ray.direction, ray.delta);
@@ -61,52 +63,52 @@ pub(crate) fn traverse<L: Lanes, F: Filter<L>, P: Probe, const ORDERED: bool>(
     let mut interval = filter.interval(ray.t_min, t_max);
     // Nearest first, or without distances.
     let (mut keys, mut children) = (Stack::<u64>::new(), Stack::<u32>::new());
-    let mut current = tree.root;
+    let mut current = tree.root();
     loop {
         while !current.is_leaf() {
-            let node = &tree.nodes[current.index()];
+            let node = tree.node(current);
+            let below = node.children();
             let (mut hits, enter) = boxes.test(node, t_min, ends);
             probe.boxes(8);
             if !probe.prunes() {
-                hits = node.children.iter().enumerate().fold(0, |m, (k, &c)| m | u32::from(c != u32::MAX) << k);
+                hits = below.iter().enumerate().fold(0, |m, (k, &c)| m | u32::from(c != u32::MAX) << k);
             }
             if hits == 0 {
                 current = Reference::NOTHING;
                 break;
             }
             if hits & (hits - 1) == 0 {
-                current = Reference(node.children[hits.trailing_zeros() as usize & 7]);
+                current = Reference(below[hits.trailing_zeros() as usize & 7]);
                 continue;
             }
             if ORDERED {
                 // Keys are ordered by the bits of distances, which must not be negative; what begins before 0 is all
                 // alike, and never beyond the end.
-                let hit = enter.max(L::splat(0.0)).pack(&node.children, hits);
+                let hit = enter.max(L::splat(0.0)).pack(below, hits);
                 current =
                     Reference(keys.push_all_but_nearest(hit, hits.count_ones() as usize, probe.reversed()) as u32);
             } else {
                 // The largest is the last.
                 let last = 31 - hits.leading_zeros();
-                current = Reference(node.children[last as usize & 7]);
+                current = Reference(below[last as usize & 7]);
                 let rest = hits ^ 1 << last;
-                children.push(&L::pack_words(&node.children, rest), rest.count_ones() as usize);
+                children.push(&L::pack_words(below, rest), rest.count_ones() as usize);
             }
         }
         if current != Reference::NOTHING {
-            let (index, lanes) = (current.block(), current.lanes());
-            probe.primitives(lanes.count_ones());
-            // Where one block is enough, no other is fetched.
-            let high = index + usize::from(lanes > 0xf);
-            let leaf = Leaf { low: &tree.blocks[index], high: &tree.blocks[high], lanes };
+            let leaf = tree.leaf(current);
+            probe.leaf();
+            probe.primitives(leaf.lanes().count_ones());
             let (mut candidates, known) = filter.candidates(&leaf, &interval);
             if candidates != 0 {
                 let known = [known[0].store(), known[1].store(), known[2].store()];
                 while candidates != 0 {
                     let lane = candidates.trailing_zeros() as usize & 7;
                     candidates &= candidates - 1;
-                    let triangle = tree.blocks[index + lane / 4].triangle(lane);
+                    let place = leaf.place(lane);
+                    let triangle = tree.triangle(place);
                     let known = [known[0][lane], known[1][lane], known[2][lane]];
-                    if let Some(end) = visitor.visit(index * 4 + lane, &triangle, known, probe)? {
+                    if let Some(end) = visitor.visit(place, &triangle, known, probe)? {
                         t_max = end;
                         ends = L::splat(end);
                         interval = filter.interval(ray.t_min, end);

@@ -9,30 +9,15 @@ use glam::Vec3;
 
 use crate::Guards;
 use crate::guards::GuardSet;
-use crate::layout::wide8::Block;
 use crate::simd::Lanes;
+use crate::wide::Leaf;
 
 /// Eight vectors.
 type Vectors<L> = [L; 3];
 
-/// Triangles of a leaf: those of two blocks, of which some lanes count.
-#[derive(Clone, Copy)]
-pub(crate) struct Leaf<'a> {
-    pub(crate) low: &'a Block,
-    pub(crate) high: &'a Block,
-    pub(crate) lanes: u32,
-}
-
-impl Leaf<'_> {
-    #[inline(always)]
-    fn load<L: Lanes>(&self, vertex: usize, axis: usize) -> L {
-        L::load_halves(&self.low.0[vertex][axis], &self.high.0[vertex][axis])
-    }
-
-    #[inline(always)]
-    fn vertex<L: Lanes>(&self, vertex: usize) -> Vectors<L> {
-        [self.load(vertex, 0), self.load(vertex, 1), self.load(vertex, 2)]
-    }
+#[inline(always)]
+fn vertex<L: Lanes>(leaf: &impl Leaf, vertex: usize) -> Vectors<L> {
+    [leaf.load(vertex, 0), leaf.load(vertex, 1), leaf.load(vertex, 2)]
 }
 
 /// What a filter knows of the triangles: edge functions, or `t`, `u` and `v`.
@@ -45,7 +30,7 @@ pub(crate) trait Filter<L: Lanes>: Copy {
     /// The boxes' interval, which has room for rounding.
     fn interval(&self, t_min: f32, t_max: f32) -> Self::Interval;
     /// One bit for each lane of the leaf that may be hit in the interval.
-    fn candidates(&self, leaf: &Leaf<'_>, interval: &Self::Interval) -> (u32, Known<L>);
+    fn candidates(&self, leaf: &impl Leaf, interval: &Self::Interval) -> (u32, Known<L>);
 }
 
 /// The operations of the watertight test in `f32`, as [`Shear::weights`] does them: the same decision, but for edge
@@ -101,7 +86,7 @@ impl<L: Lanes> Sheared<L> {
     }
 
     #[inline(always)]
-    fn corner(&self, leaf: &Leaf<'_>, vertex: usize) -> [L; 3] {
+    fn corner(&self, leaf: &impl Leaf, vertex: usize) -> [L; 3] {
         let x = leaf.load::<L>(vertex, self.axes[0]).sub(self.origin[0]);
         let y = leaf.load::<L>(vertex, self.axes[1]).sub(self.origin[1]);
         let z = leaf.load::<L>(vertex, self.axes[2]).sub(self.origin[2]);
@@ -109,7 +94,7 @@ impl<L: Lanes> Sheared<L> {
     }
 
     #[inline(always)]
-    fn project(&self, leaf: &Leaf<'_>) -> Projected<L> {
+    fn project(&self, leaf: &impl Leaf) -> Projected<L> {
         let [a, b, c] = [self.corner(leaf, 0), self.corner(leaf, 1), self.corner(leaf, 2)];
         Projected {
             edges: [edge(c, b), edge(a, c), edge(b, a)],
@@ -156,12 +141,12 @@ impl<L: Lanes> Filter<L> for Sheared<L> {
     }
 
     #[inline(always)]
-    fn candidates(&self, leaf: &Leaf<'_>, depths: &[L; 2]) -> (u32, Known<L>) {
+    fn candidates(&self, leaf: &impl Leaf, depths: &[L; 2]) -> (u32, Known<L>) {
         let p = self.project(leaf);
         let [e0, e1, e2] = p.edges;
         let zero = L::splat(0.0);
         let hit = zero.le(e0.min(e1).min(e2)) | e0.max(e1).max(e2).le(zero);
-        (hit & p.within(depths) & leaf.lanes, p.edges)
+        (hit & p.within(depths) & leaf.lanes(), p.edges)
     }
 }
 
@@ -178,7 +163,7 @@ impl<L: Lanes> Filter<L> for Margin<L> {
     }
 
     #[inline(always)]
-    fn candidates(&self, leaf: &Leaf<'_>, depths: &[L; 2]) -> (u32, Known<L>) {
+    fn candidates(&self, leaf: &impl Leaf, depths: &[L; 2]) -> (u32, Known<L>) {
         let p = self.0.project(leaf);
         let ([e0, e1, e2], m) = (p.edges, p.size);
         // Coordinates up to m (plus x), each off by x: a product is off by 2mx + x^2, and rounded; two of them.
@@ -186,7 +171,7 @@ impl<L: Lanes> Filter<L> for Margin<L> {
         let bound = m.mul(x).mul(L::splat(4.5)).add(x.mul(x).mul(L::splat(3.0))).add(m.mul(m).mul(L::splat(4e-7)));
         let least = L::splat(0.0).sub(bound);
         let hit = least.le(e0.min(e1).min(e2)) | e0.max(e1).max(e2).le(bound);
-        (hit & p.within(depths) & leaf.lanes, p.edges)
+        (hit & p.within(depths) & leaf.lanes(), p.edges)
     }
 }
 
@@ -213,8 +198,8 @@ impl<L: Lanes> Filter<L> for Plain<L> {
     }
 
     #[inline(always)]
-    fn candidates(&self, leaf: &Leaf<'_>, [t_min, t_max]: &[L; 2]) -> (u32, Known<L>) {
-        let [v0, v1, v2] = [leaf.vertex::<L>(0), leaf.vertex(1), leaf.vertex(2)];
+    fn candidates(&self, leaf: &impl Leaf, [t_min, t_max]: &[L; 2]) -> (u32, Known<L>) {
+        let [v0, v1, v2] = [vertex::<L>(leaf, 0), vertex(leaf, 1), vertex(leaf, 2)];
         let (e1, e2) = (minus(v1, v0), minus(v2, v0));
         let p = cross(self.direction, e2);
         let det = dot(e1, p);
@@ -222,7 +207,7 @@ impl<L: Lanes> Filter<L> for Plain<L> {
         let q = cross(s, e1);
         let (u, v) = (dot(s, p), dot(self.direction, q));
         let (a, b, zero) = (u.turned_by(det), v.turned_by(det), L::splat(0.0));
-        let inside = zero.le(a) & zero.le(b) & a.add(b).le(det.abs()) & leaf.lanes;
+        let inside = zero.le(a) & zero.le(b) & a.add(b).le(det.abs()) & leaf.lanes();
         if inside == 0 {
             return (0, [zero; 3]);
         }
@@ -273,7 +258,7 @@ impl<L: Lanes, G: GuardSet> Filter<L> for Either<L, G> {
     }
 
     #[inline(always)]
-    fn candidates(&self, leaf: &Leaf<'_>, interval: &[L; 2]) -> (u32, Known<L>) {
+    fn candidates(&self, leaf: &impl Leaf, interval: &[L; 2]) -> (u32, Known<L>) {
         if self.guards.has(Guards::WATERTIGHT) {
             self.sheared.candidates(leaf, interval)
         } else {
@@ -285,19 +270,22 @@ impl<L: Lanes, G: GuardSet> Filter<L> for Either<L, G> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::layout::compact8::{Compact8, fits};
+    use crate::layout::wide8::{Block, Reference, Wide8};
     use crate::simd::{Available, Level, Work, run};
+    use crate::wide::WideTree;
     use firsthit_geometry::triangle;
     use proptest::prelude::*;
 
-    struct Candidates<'a> {
-        leaf: Leaf<'a>,
+    struct Candidates<'a, T> {
+        leaf: &'a T,
         origin: Vec3,
         direction: Vec3,
         off: f32,
         interval: [f32; 2],
     }
 
-    impl Work for Candidates<'_> {
+    impl<T: Leaf> Work for Candidates<'_, T> {
         type Output = [u32; 3];
         #[inline(always)]
         fn run<L: Lanes>(self) -> [u32; 3] {
@@ -305,9 +293,9 @@ mod tests {
             let sheared = Sheared::<L>::new(self.origin, self.direction, &shear, self.off, 1e-5);
             let ([low, high], plain) = (self.interval, Plain::<L>::new(self.origin, self.direction));
             [
-                plain.candidates(&self.leaf, &plain.interval(low, high)).0,
-                sheared.candidates(&self.leaf, &sheared.interval(low, high)).0,
-                Margin(sheared).candidates(&self.leaf, &Margin(sheared).interval(low, high)).0,
+                plain.candidates(self.leaf, &plain.interval(low, high)).0,
+                sheared.candidates(self.leaf, &sheared.interval(low, high)).0,
+                Margin(sheared).candidates(self.leaf, &Margin(sheared).interval(low, high)).0,
             ]
         }
     }
@@ -327,20 +315,33 @@ mod tests {
         ) {
             let (origin, direction) = (vector(&x[72..]), vector(&x[75..]));
             prop_assume!(direction != Vec3::ZERO);
-            let mut blocks = [Block([[[f32::NAN; 4]; 3]; 3]); 2];
-            for lane in 0..used {
-                for v in 0..3 {
-                    for k in 0..3 {
-                        blocks[lane / 4].0[v][k][lane % 4] = x[lane * 9 + v * 3 + k];
+            let corners: Vec<[Vec3; 3]> =
+                x[..9 * used].chunks(9).map(|t| [0, 3, 6].map(|k| vector(&t[k..]))).collect();
+            let mut wide = Wide8::default();
+            wide.blocks.resize(3, Block::EMPTY);
+            for (lane, t) in corners.iter().enumerate() {
+                wide.blocks[lane / 4].set_triangle(lane % 4, *t);
+            }
+            let interval = [low, high];
+            fn of<T: Leaf>(leaf: &T, (origin, direction): (Vec3, Vec3), interval: [f32; 2], level: Level) -> [u32; 3] {
+                run(Available::up_to(level), Candidates { leaf, origin, direction, off: 1e-5, interval })
+            }
+            let masks = of(&wide.leaf(Reference::leaf(0, 8)), (origin, direction), interval, Level::Scalar);
+            for level in Level::ALL {
+                let leaf = wide.leaf(Reference::leaf(0, 8));
+                prop_assert_eq!(of(&leaf, (origin, direction), interval, level), masks, "{}", level);
+                // A compact leaf of those that have few enough vertices.
+                let some = (1..=used).rev().find(|&n| fits(corners[..n].iter().copied())).unwrap_or(0);
+                if some > 0 {
+                    wide.root = Reference::leaf(0, some);
+                    let compact = Compact8::new(&wide, &[0, 1, 2, 3, 4, 5, 6, 7]);
+                    let found = of(&compact.leaf(compact.root()), (origin, direction), interval, level);
+                    prop_assert_eq!(found, masks.map(|m| m & ((1 << some) - 1)), "compact {}", level);
+                    for (k, place) in compact.places().enumerate() {
+                        prop_assert_eq!(compact.number(place), Some(k as u32));
+                        prop_assert_eq!(WideTree::triangle(&compact, place), corners[k]);
                     }
                 }
-            }
-            let leaf = Leaf { low: &blocks[0], high: &blocks[1], lanes: 0xff };
-            let interval = [low, high];
-            let of = |level| run(Available::up_to(level), Candidates { leaf, origin, direction, off: 1e-5, interval });
-            let masks = of(Level::Scalar);
-            for level in Level::ALL {
-                prop_assert_eq!(of(level), masks, "{}", level);
             }
             let shear = Shear::<f32>::new(direction);
             let exact = Shear::<f64>::new(direction.as_dvec3());
@@ -350,7 +351,7 @@ mod tests {
                     prop_assert_eq!(passes, [false; 3]);
                     continue;
                 }
-                let t = blocks[lane / 4].triangle(lane % 4);
+                let t = corners[lane];
                 let inside = |t: f64| f64::from(low) <= t && t <= f64::from(high);
                 let plane = triangle::plane_parameter(t.map(|p| p.as_dvec3()), origin.as_dvec3(), direction.as_dvec3());
                 // The plane of a sliver tells little: there only triangles with some area are compared.

@@ -40,7 +40,7 @@ pub(crate) struct BenchArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub(crate) rays: Vec<BenchRays>,
 
-    /// Only these memory layouts, comma-separated: bvh2, wide8 [default: all]
+    /// Only these memory layouts, comma-separated: bvh2, wide8, compact8 [default: all]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::layout)]
     pub(crate) layout: Vec<Layout>,
 
