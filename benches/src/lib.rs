@@ -3,10 +3,12 @@
 //! * `cargo bench -p firsthit-benches`: criterion benches of kernels, queries, builds and traversal (`benches/benches/`).
 //! * `cargo run --release -p firsthit-benches --bin peers`: speed, memory, build time and wrong answers, firsthit beside
 //!   its peers.
+//! * `cargo run --release -p firsthit-benches --bin growth`: time of a ray as one mesh grows from 1,000 triangles to 10 M.
 //! * `cargo run --release -p firsthit-benches --bin leaks`: rays lost through closed meshes, firsthit beside its peers.
 
 pub mod engine;
 pub mod generated;
+pub mod growth;
 pub mod judge;
 pub mod memory;
 pub mod model;

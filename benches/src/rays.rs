@@ -117,7 +117,7 @@ pub fn ray_sets(model: &Model, reference: &Reference<'_>, kinds: &[Kind], count:
 
 /// A pinhole camera's rays; neighbours in the list are neighbours in the picture. More rays than the picture has pixels go
 /// around again.
-fn primary(model: &Model, count: usize, random: &mut Pcg) -> Vec<Ray32> {
+pub(crate) fn primary(model: &Model, count: usize, random: &mut Pcg) -> Vec<Ray32> {
     let view = model.view();
     let forward = (view.at - view.eye).normalize();
     let right = forward.cross(Vec3::Y).normalize();
@@ -147,7 +147,7 @@ fn leave(model: &Model, diagonal: f32, ray: &Ray32, hit: &Truth) -> (Vec3, Vec3)
 }
 
 /// A direction of the hemisphere, by the cosine.
-fn scatter(normal: Vec3, random: &mut Pcg) -> Vec3 {
+pub(crate) fn scatter(normal: Vec3, random: &mut Pcg) -> Vec3 {
     let (a, b) = (random.unit(), random.unit());
     let (radius, angle) = (a.sqrt(), b * std::f32::consts::TAU);
     let aside = if normal.x.abs() > 0.8 { Vec3::Y } else { Vec3::X };
