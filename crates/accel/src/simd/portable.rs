@@ -39,16 +39,16 @@ impl Lanes for Portable {
     #[inline(always)]
     fn load_bytes(rows: &[[u8; 8]; 6], row: Row) -> Self {
         let mut out = [0.0; 8];
-        for k in 0..8 {
-            out[k] = f32::from(rows[row.0 / 8][k]);
+        for (out, plane) in out.iter_mut().zip(&rows[row.0 / 8]) {
+            *out = f32::from(*plane);
         }
         Self(out)
     }
     #[inline(always)]
     fn look_up(words: &[u32; 8], vertex: usize, table: &[u32; 16]) -> Self {
         let mut out = [0.0; 8];
-        for k in 0..8 {
-            out[k] = f32::from_bits(table[(words[k] >> (4 * vertex) & 15) as usize]);
+        for (out, word) in out.iter_mut().zip(words) {
+            *out = f32::from_bits(table[(word >> (4 * vertex) & 15) as usize]);
         }
         Self(out)
     }
