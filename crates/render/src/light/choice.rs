@@ -76,7 +76,7 @@ impl LightChoice {
 
     /// About the irradiance of a light without a place.
     fn of_distant(light: &PunctualLight, to: &Receiver) -> f32 {
-        let Some((direction, irradiance, spread)) = light.from_afar(to.point) else { return 0.0 };
+        let Some((direction, irradiance, spread)) = light.afar(to.point) else { return 0.0 };
         irradiance * (direction.dot(to.normal) + spread).clamp(to.least_cos, 1.0)
     }
 

@@ -98,7 +98,7 @@ impl PunctualLight {
 
     /// Of lights without a place: the direction towards it, the irradiance on what faces it, and the sine of half the
     /// angle under which it is seen.
-    pub(crate) fn from_afar(&self, point: DVec3) -> Option<(Vec3, f32, f32)> {
+    pub(crate) fn afar(&self, point: DVec3) -> Option<(Vec3, f32, f32)> {
         let spread = match self {
             Self::Point { .. } => return None,
             Self::Directional { one_minus_cos, .. } => (one_minus_cos * (2.0 - one_minus_cos)).max(0.0).sqrt(),
