@@ -264,7 +264,7 @@ fn line(points: &[(f64, f64)]) -> Option<(f64, f64)> {
         (xx + x * x, xy + x * (p.1 - my))
     });
     let slope = xy / xx;
-    slope.is_finite().then(|| (my - slope * mx, slope))
+    slope.is_finite().then_some((my - slope * mx, slope))
 }
 
 impl Growth {
