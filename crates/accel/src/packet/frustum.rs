@@ -109,8 +109,8 @@ impl Group {
     pub(super) fn meet<L: Lanes>(&self, node: &Node, child: usize, negative: [bool; 3]) -> u32 {
         let mut enter = L::load(&self.start);
         let mut leave = L::load(&self.end);
-        for axis in 0..3 {
-            let side = usize::from(negative[axis]);
+        for (axis, negative) in negative.into_iter().enumerate() {
+            let side = usize::from(negative);
             let (entry, exit) =
                 (node.planes[Node::row(axis, side)][child], node.planes[Node::row(axis, 1 - side)][child]);
             let inverse = L::load(&self.inverse[axis]);

@@ -38,8 +38,8 @@ pub(crate) struct Group {
     pub(super) normal: [Doubles; 3],
     pub(super) u: Singles,
     pub(super) v: Singles,
-    /// The nearest hit's place in the leaves.
-    pub(super) place: [u32; 8],
+    /// The nearest hit's place in the leaves, as bits: see [`Group::place`].
+    pub(super) place: Singles,
     /// Lanes with a hit.
     pub(super) hit: u32,
     /// Lanes with a ray that can hit anything.
@@ -194,6 +194,12 @@ impl Group {
         self.box_t::<L>(t_min, -1.0).put(&mut self.start);
     }
 
+    /// The place of a ray's nearest hit. (Places are so small that as bits of an `f32` none is a NaN.)
+    #[inline(always)]
+    pub(super) fn place(&self, lane: usize) -> usize {
+        self.place[lane].to_bits() as usize
+    }
+
     /// The axis that a ray follows most, as [`Shear::axis`](firsthit_geometry::triangle::Shear::axis).
     #[inline(always)]
     pub(super) fn axis(&self, lane: u32) -> usize {
@@ -218,9 +224,8 @@ impl Group {
     #[inline(always)]
     pub(super) fn wake<L: Lanes>(&mut self, lanes: u32, axes: [usize; 3]) {
         self.sleep::<L>(lanes);
-        for k in 0..3 {
-            self.sheared[k] = self.origin32[axes[k]];
-        }
+        let [x, y, z] = axes;
+        self.sheared = [self.origin32[x], self.origin32[y], self.origin32[z]];
         let z = L::load(&self.direction32[axes[2]]);
         L::load(&self.direction32[axes[0]]).div(z).put(&mut self.slopes[0]);
         L::load(&self.direction32[axes[1]]).div(z).put(&mut self.slopes[1]);

@@ -1,6 +1,6 @@
 //! Packets: rays that go the same way, through the tree together.
 //!
-//! A packet is two groups of eight rays. Setting up, triangles and finishing are done for eight rays at once, nodes are
+//! A packet is some groups of eight rays. Setting up, triangles and finishing are done for eight rays at once, nodes are
 //! met by all together. The answers are those of single rays, bit by bit (of `Fast` but for rays at the very edges of
 //! boxes, which a packet may find where a single ray does not).
 
@@ -24,7 +24,7 @@ use tier::Way;
 use trace::{Among, trace};
 
 /// Groups of a packet.
-const GROUPS: usize = 2;
+const GROUPS: usize = 4;
 
 /// Rays of a packet.
 pub(crate) const RAYS: usize = 8 * GROUPS;
@@ -131,13 +131,13 @@ impl Group {
         let inverse = of(1.0).div(vectors::dot(normal, normal).sqrt());
         let unit = vectors::scaled(normal, inverse);
         let usable = of(0.0).lt(inverse) & inverse.le(of(f64::MAX));
-        for axis in 0..3 {
-            unit[axis].select(usable, of(0.0)).store(&mut self.normal[axis]);
+        for (unit, normal) in unit.into_iter().zip(&mut self.normal) {
+            unit.select(usable, of(0.0)).store(normal);
         }
         for (lane, hit) in hits.iter_mut().enumerate() {
             *hit = None;
             if self.hit >> lane & 1 == 1
-                && let Some(id) = model.id(self.place[lane] as usize)
+                && let Some(id) = model.id(self.place(lane))
             {
                 let normal = DVec3::new(self.normal[0][lane], self.normal[1][lane], self.normal[2][lane]);
                 let id = HitId { instance: 0, geometry: id.geometry, primitive: id.primitive };

@@ -135,16 +135,7 @@ impl Tier for Robust {
         let [e0, e1, e2] = [edge(c, b), edge(a, c), edge(b, a)];
         let zero = L::splat(0.0);
         let hit = zero.le(e0.min(e1).min(e2)) | e0.max(e1).max(e2).le(zero);
-        if hit & group.awake == 0 {
-            return (0, [e0, e1, e2]);
-        }
-        // Depths in the interval.
-        let depth = L::load(&group.direction32[way.axes[2]]);
-        let slack = L::load(&group.delta).add(L::load(&group.delta));
-        let (first, last) = (L::load(&group.start).mul(depth), L::load(&group.end).mul(depth));
-        let (low, high) = if way.negative[way.axes[2]] { (last, first) } else { (first, last) };
-        let within = a[2].min(b[2]).min(c[2]).le(high.add(slack)) & low.sub(slack).le(a[2].max(b[2]).max(c[2]));
-        (hit & within & group.awake, [e0, e1, e2])
+        (hit & group.awake, [e0, e1, e2])
     }
 
     #[inline(always)]

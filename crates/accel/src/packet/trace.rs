@@ -8,7 +8,7 @@ use super::group::Group;
 use super::tier::{Known, Tier, Way};
 use crate::layout::wide8::{Reference, Wide8};
 use crate::model::Model;
-use crate::simd::{Eight, Lanes, Stack};
+use crate::simd::{Eight, Lanes, Stack, prefetch};
 use crate::wide::{Filter, WideTree};
 
 /// The mesh that a packet goes through, and its rays.
@@ -60,6 +60,17 @@ pub(super) fn trace<L: Lanes, T: Tier, const ANY: bool>(among: &Among<'_>, group
         let mut key = None;
         if hits != 0 {
             let slots = slots(current);
+            let mut coming = hits;
+            while coming != 0 {
+                let child = Reference(node.children[coming.trailing_zeros() as usize & 7]);
+                coming &= coming - 1;
+                if child.is_leaf() {
+                    prefetch(&tree.blocks[child.block()]);
+                    prefetch(&tree.blocks[child.block() + usize::from(child.lanes() > 0xf)]);
+                } else {
+                    prefetch(&tree.nodes[child.index()]);
+                }
+            }
             let sorted = enter.max(L::splat(0.0)).pack(&slots, hits);
             key = Some(if hits & (hits - 1) == 0 {
                 sorted[0]
@@ -114,9 +125,9 @@ pub(super) fn trace<L: Lanes, T: Tier, const ANY: bool>(among: &Among<'_>, group
                             triangles &= triangles - 1;
                             let triangle = tree.blocks[block + lane / 4].triangle(lane);
                             let (candidates, known) = T::candidates::<L>(group, way, &triangle);
-                            if candidates & rays != 0 {
-                                found.push(candidates & rays, block * 4 + lane, known);
-                            }
+                            // Without a branch: what is hit is not to be predicted.
+                            found.push(candidates & rays, block * 4 + lane, known);
+                            found.len -= usize::from(candidates & rays == 0);
                         }
                     }
                     for k in 0..found.len.min(8) {
@@ -171,7 +182,7 @@ impl Group {
             while ties != 0 {
                 let lane = ties.trailing_zeros();
                 ties &= ties - 1;
-                take |= u32::from(comes_first(among.model, place, self.place[lane as usize & 7])) << lane;
+                take |= u32::from(comes_first(among.model, place, self.place(lane as usize & 7))) << lane;
             }
         }
         let mut shortened = false;
@@ -188,11 +199,7 @@ impl Group {
                 for axis in 0..3 {
                     met.normal[axis].select(take, L::Eight::load(&self.normal[axis])).store(&mut self.normal[axis]);
                 }
-                let mut lanes = take;
-                while lanes != 0 {
-                    self.place[lanes.trailing_zeros() as usize & 7] = place as u32;
-                    lanes &= lanes - 1;
-                }
+                L::splat(f32::from_bits(place as u32)).choose(take, L::load(&self.place)).put(&mut self.place);
                 self.box_t::<L>(t, 1.0).choose(take, L::load(&self.end)).put(&mut self.end);
             }
         }
@@ -231,10 +238,11 @@ impl Group {
             self.awake &= !bit;
         } else {
             let tie = hit.t == self.t_max[lane] && self.hit & bit != 0;
-            if tie && !comes_first(among.model, place, self.place[lane]) {
+            if tie && !comes_first(among.model, place, self.place(lane)) {
                 return false;
             }
-            (self.t_max[lane], self.u[lane], self.v[lane], self.place[lane]) = (hit.t, hit.u, hit.v, place as u32);
+            (self.t_max[lane], self.u[lane], self.v[lane]) = (hit.t, hit.u, hit.v);
+            self.place[lane] = f32::from_bits(place as u32);
             let DVec3 { x, y, z } = hit.normal;
             (self.normal[0][lane], self.normal[1][lane], self.normal[2][lane]) = (x, y, z);
             self.end[lane] = self.box_t_of(lane);
@@ -247,6 +255,6 @@ impl Group {
 /// Whether a triangle comes before another that is hit at the same distance.
 #[cold]
 #[inline(never)]
-fn comes_first(model: &Model, place: usize, other: u32) -> bool {
-    model.number(place) < model.number(other as usize)
+fn comes_first(model: &Model, place: usize, other: usize) -> bool {
+    model.number(place) < model.number(other)
 }

@@ -146,16 +146,16 @@ impl Packed for Portable {
     #[inline(always)]
     fn widen(self) -> PortableEight {
         let mut out = [0.0; 8];
-        for k in 0..8 {
-            out[k] = f64::from(self.0[k]);
+        for (out, x) in out.iter_mut().zip(self.0) {
+            *out = f64::from(x);
         }
         PortableEight(out)
     }
     #[inline(always)]
     fn narrow(x: PortableEight) -> Self {
         let mut out = [0.0; 8];
-        for k in 0..8 {
-            out[k] = x.0[k] as f32;
+        for (out, x) in out.iter_mut().zip(x.0) {
+            *out = x as f32;
         }
         Self(out)
     }

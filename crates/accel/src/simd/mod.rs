@@ -164,6 +164,24 @@ impl Available {
     }
 }
 
+/// Asks for what will be needed soon.
+#[inline(always)]
+pub(crate) fn prefetch<T>(what: &T) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use core::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        let start = core::ptr::from_ref(what).cast::<i8>();
+        let mut line = 0;
+        while line < size_of::<T>() {
+            // SAFETY: the address is within what the reference is to, and what is fetched is not looked at.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(start.add(line)) };
+            line += 64;
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = what;
+}
+
 /// Does the work by the instructions of a level.
 #[inline(always)]
 pub(crate) fn run<W: Work>(level: Available, work: W) -> W::Output {
