@@ -28,6 +28,7 @@ pub(crate) struct Above {
     depth: u32,
 }
 
+#[allow(clippy::large_enum_variant, reason = "one for each scene, and read by every ray")]
 #[derive(Clone, Debug)]
 enum AboveTree {
     Binary(Bvh2<f64>),
