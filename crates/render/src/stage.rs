@@ -194,7 +194,9 @@ impl Stage {
                 },
                 |id, u, v| {
                     let hit = firsthit_accel::Hit { id, t: 0.0, u, v, normal: glam::DVec3::Z };
-                    of(id).emission::<true>(&world.attributes(&hit, true))
+                    let (material, at) = (of(id), world.attributes(&hit, true));
+                    // How much is there of a mesh is looked up where it is asked.
+                    if world.is_shape(id) { material.glow::<true>(&at) } else { material.emission::<true>(&at) }
                 },
             )
         } else {

@@ -74,6 +74,13 @@ impl World {
         }
     }
 
+    /// Whether it is a shape, not a triangle.
+    pub(crate) fn is_shape(&self, id: HitId) -> bool {
+        let instance = &self.instances[id.instance as usize];
+        let geometry = &self.scene.meshes[instance.mesh].geometries[id.geometry as usize];
+        matches!(geometry.surface, SurfaceDesc::Shape(_))
+    }
+
     /// Whether a ray in this direction meets the outer side of a triangle or not; shapes always count as outside.
     pub(crate) fn faces(&self, id: HitId, direction: DVec3) -> bool {
         let instance = &self.instances[id.instance as usize];

@@ -1,5 +1,6 @@
 //! Pictures against answers that are known in closed form.
 
+mod both_ways;
 mod common;
 mod layers;
 mod path;

@@ -101,7 +101,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
             let (choice, u) = numbers(MESH);
             if let Some((mut sample, hit)) = light.sample(position, choice, u, lit.surface.id) {
                 let glow = stage.world.attributes(&hit, true);
-                sample.radiance *= stage.materials[stage.world.material(hit.id)].emission::<TEXTURES>(&glow);
+                sample.radiance *= stage.materials[stage.world.material(hit.id)].glow::<TEXTURES>(&glow);
                 total += self.arriving(lit, &sample, RayKind::ShadowArea);
             }
         }

@@ -14,7 +14,7 @@ use firsthit_accel::{Hit, HitId};
 use firsthit_geometry::Ray;
 use glam::Vec3;
 
-use super::scatter::{Scatter, family, is_delta};
+use super::scatter::{Scatter, Towards, family, is_delta};
 use super::whitted::{Limits, Seen};
 use super::{Tracer, aov};
 use crate::RayKind;
@@ -114,10 +114,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
                 self.escape_by_path(&walk, screen, limits, &mut seen);
                 return seen;
             };
-            if walk.absorption != Vec3::ZERO {
-                let way = hit.t * walk.ray.direction.length();
-                walk.throughput *= (walk.absorption * -(way as f32)).map(f32::exp);
-            }
+            walk.throughput *= walk.left_after(hit.t);
             if !self.scatter(&mut walk, &hit, sampler, limits, &mut seen) {
                 return seen;
             }
@@ -141,7 +138,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
             let density = light.pdf(asked.receiver.point, walk.ray.direction, distance);
             self.stage.lights.choice.probability(Chosen::Shape(i), &asked.shares, &asked.receiver) * density
         });
-        seen.color += walk.throughput * light.radiance * share;
+        seen.color += walk.throughput * walk.left_after(t) * light.radiance * share;
         true
     }
 
@@ -270,8 +267,11 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
         walk.source = Some(surface.id);
         walk.ray = Ray::new(surface.point.spawn(direction), direction);
         walk.scattered = match (on.pdf, asked) {
-            // Light that enters a solid has not been asked: see `Vertex::enters`.
-            (Some(pdf), Some((receiver, shares))) if !(entered && surface.front) => {
+            // Light that enters a solid has not been asked: see `Vertex::enters`. Nor has what comes from below the
+            // curved surface that the normals mean.
+            (Some(pdf), Some((receiver, shares)))
+                if !(entered && surface.front) && (through || direction.as_vec3().dot(surface.smooth) > 0.0) =>
+            {
                 Some(Asked { receiver, shares, pdf })
             }
             _ => None,
@@ -336,7 +336,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
                     .and_then(|mesh| mesh.sample_triangle(i, 1.0 / f64::from(probability), from, u, at.surface.id));
                 let sample = sample.map(|(mut sample, hit)| {
                     let glow = stage.world.attributes(&hit, true);
-                    sample.radiance *= stage.materials[stage.world.material(hit.id)].emission::<TEXTURES>(&glow);
+                    sample.radiance *= stage.materials[stage.world.material(hit.id)].glow::<TEXTURES>(&glow);
                     sample
                 });
                 (sample, RayKind::ShadowArea)
@@ -364,13 +364,13 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
         if !(before || behind) {
             return Vec3::ZERO;
         }
-        let (f, pdf) = at.scatter.towards(wi);
-        let mut light = f * sample.radiance;
+        let Towards { mut followed, others, pdf } = at.scatter.towards(wi);
         if let Some(own) = sample.pdf {
             // Following never leaves on the other side of the triangle.
             let other = if (side > 0.0) == (wi.z > 0.0) { pdf } else { 0.0 };
-            light *= power_heuristic(own, other);
+            followed *= power_heuristic(own, other);
         }
+        let mut light = (followed + others) * sample.radiance;
         if !(light.max_element() > 0.0) {
             return Vec3::ZERO;
         }
@@ -431,6 +431,16 @@ impl Walk {
             Some(asked) => power_heuristic(asked.pdf, density(asked)),
             None => 1.0,
         }
+    }
+
+    /// What absorption leaves of light on the way to a point of the ray.
+    #[inline]
+    fn left_after(&self, t: f64) -> Vec3 {
+        if self.absorption == Vec3::ZERO {
+            return Vec3::ONE;
+        }
+        let way = t * self.ray.direction.length();
+        (self.absorption * -(way as f32)).map(f32::exp)
     }
 
     /// Goes on straight behind a surface.

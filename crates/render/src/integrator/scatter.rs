@@ -18,6 +18,17 @@ pub(super) struct Scattered {
     pub(super) lobe: usize,
 }
 
+/// How much is scattered from one direction.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Towards {
+    /// f |cos| of the lobes that are followed.
+    pub(super) followed: Vec3,
+    /// That of the others, whose light is found by asking alone.
+    pub(super) others: Vec3,
+    /// Density of all followed lobes together.
+    pub(super) pdf: f32,
+}
+
 /// How a surface scatters towards one viewer.
 pub(super) struct Scatter<'a> {
     bsdf: &'a Bsdf,
@@ -74,18 +85,20 @@ impl<'a> Scatter<'a> {
         Self { bsdf, wo, chances, spreads }
     }
 
-    /// f |cos| of all lobes towards a direction of their frame, and the density with which following them would have
-    /// found it.
+    /// f |cos| towards a direction of the lobes' frame, and the density with which following would have found it.
     #[inline]
-    pub(super) fn towards(&self, wi: Vec3) -> (Vec3, f32) {
-        let (mut f, mut pdf) = (Vec3::ZERO, 0.0);
+    pub(super) fn towards(&self, wi: Vec3) -> Towards {
+        let mut towards = Towards { followed: Vec3::ZERO, others: Vec3::ZERO, pdf: 0.0 };
         for (lobe, chance) in self.bsdf.lobes().iter().zip(self.chances) {
-            f += lobe.eval(self.wo, wi);
+            let f = lobe.eval(self.wo, wi);
             if chance > 0.0 {
-                pdf += chance * lobe.pdf(self.wo, wi);
+                towards.followed += f;
+                towards.pdf += chance * lobe.pdf(self.wo, wi);
+            } else {
+                towards.others += f;
             }
         }
-        (f, pdf)
+        towards
     }
 
     /// Draws a lobe by the first number and a direction by the others.

@@ -115,6 +115,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
             if let Some((t, light)) = self.stage.lights.area.hit(&path.ray)
                 && hit.is_none_or(|h| t < h.t)
             {
+                path.absorb(t);
                 seen.color += path.throughput
                     * light.radiance
                     * path.share_with_light(|c, d| light.pdf(c.from, d, (path.ray.at(t) - c.from).length()));

@@ -93,8 +93,11 @@ impl ShapeLight {
                 (distance * distance / (area * -normal.dot(direction)).max(f64::MIN_POSITIVE)) as f32
             }
             Form::Sphere(sphere) => match one_minus_cos_of_ball(sphere, from) {
-                Some(x) => (1.0 / (2.0 * PI * x)) as f32,
-                None => 0.0,
+                // Only the near side is asked: the far one may be seen through alpha.
+                Some(x) if distance * distance <= (sphere.center() - from).length_squared() => {
+                    (1.0 / (2.0 * PI * x)) as f32
+                }
+                _ => 0.0,
             },
         }
     }

@@ -140,6 +140,19 @@ impl Layers {
         self.through.is_some()
     }
 
+    fn coat_weight<const TEXTURES: bool>(&self, surface: &Surface<'_>) -> Option<(&Coat, f32)> {
+        let coat = self.coat.as_ref()?;
+        let weight = (coat.factor * scalar::<TEXTURES>(coat.texture.as_ref(), surface)).clamp(0.0, 1.0);
+        (weight > 0.0).then_some((coat, weight))
+    }
+
+    /// What coat and sheen leave of light that passes straight through at this cosine: normal maps do not count.
+    pub(super) fn passed<const TEXTURES: bool>(&self, surface: &Surface<'_>, cos: f32) -> f32 {
+        let coat = self.coat_weight::<TEXTURES>(surface).map_or(1.0, |(_, weight)| Clearcoat::passed(weight, cos));
+        let sheen = self.sheen::<TEXTURES>(surface, cos).map_or(1.0, |(_, passed)| passed);
+        coat * sheen
+    }
+
     /// The coat as a lobe about the base's normal, and what it leaves of the light below.
     pub(super) fn coat<const TEXTURES: bool>(
         &self,
@@ -147,11 +160,7 @@ impl Layers {
         bend: bool,
         local: impl Fn(Vec3) -> Vec3,
     ) -> Option<(Lobe, f32)> {
-        let coat = self.coat.as_ref()?;
-        let weight = (coat.factor * scalar::<TEXTURES>(coat.texture.as_ref(), surface)).clamp(0.0, 1.0);
-        if weight == 0.0 {
-            return None;
-        }
+        let (coat, weight) = self.coat_weight::<TEXTURES>(surface)?;
         let roughness = (coat.roughness * scalar::<TEXTURES>(coat.roughness_texture.as_ref(), surface)).clamp(0.0, 1.0);
         let mut normal =
             mapped::<TEXTURES>(surface, coat.normal_texture.as_ref(), coat.normal_scale).unwrap_or(surface.smooth);

@@ -191,7 +191,7 @@ impl Material {
     pub(crate) fn is_smooth<const TEXTURES: bool>(&self, surface: &Surface<'_>) -> bool {
         match &self.model {
             Model::RoughGlass { .. } => false,
-            Model::Pbr(pbr) => pbr.is_smooth::<TEXTURES>(surface),
+            Model::Pbr(pbr) | Model::Layered(pbr) => pbr.is_smooth::<TEXTURES>(surface),
             _ => true,
         }
     }
@@ -244,6 +244,11 @@ impl Material {
             Model::Emission(radiance) if surface.front => *radiance,
             _ => Vec3::ZERO,
         }
+    }
+
+    /// Radiance that the surface sends to a light's sample there: alpha lets through what it does not cover.
+    pub(crate) fn glow<const TEXTURES: bool>(&self, surface: &Surface<'_>) -> Vec3 {
+        self.emission::<TEXTURES>(surface) * self.coverage::<TEXTURES>(surface)
     }
 
     /// Everything about the surface at one point.

@@ -167,7 +167,7 @@ impl Pbr {
     }
 
     pub(super) fn glows_evenly(&self) -> bool {
-        self.emissive_texture.is_none()
+        self.emissive_texture.is_none() && !self.has_alpha()
     }
 
     fn base<const TEXTURES: bool>(&self, surface: &Surface<'_>) -> glam::Vec4 {
@@ -190,10 +190,16 @@ impl Pbr {
             return Vec3::ZERO;
         }
         let base = self.base::<TEXTURES>(surface).xyz();
-        let metallic = self.metallic * scalar::<TEXTURES>(self.metallic_texture.as_ref(), surface);
-        let transmission = self.transmission * scalar::<TEXTURES>(self.transmission_texture.as_ref(), surface);
-        let reflected = self.fresnel::<TEXTURES>(surface, base, metallic, 1.0).reflectance(cos);
-        base * (transmission * (1.0 - metallic)) * (Vec3::ONE - reflected).max(Vec3::ZERO)
+        let metallic = (self.metallic * scalar::<TEXTURES>(self.metallic_texture.as_ref(), surface)).clamp(0.0, 1.0);
+        let transmission =
+            (self.transmission * scalar::<TEXTURES>(self.transmission_texture.as_ref(), surface)).clamp(0.0, 1.0);
+        let mut fresnel = self.fresnel::<TEXTURES>(surface, base, metallic, 1.0);
+        let mut below = 1.0;
+        if let Some(layers) = self.layers.as_deref() {
+            fresnel = layers.filmed::<TEXTURES>(surface, fresnel);
+            below = layers.passed::<TEXTURES>(surface, cos);
+        }
+        base * (transmission * (1.0 - metallic) * below) * fresnel.passed(cos)
     }
 
     pub(super) fn is_smooth<const TEXTURES: bool>(&self, surface: &Surface<'_>) -> bool {
