@@ -365,9 +365,19 @@ pub(crate) struct MergeArgs {
     #[arg(long, value_name = "EV", default_value = "0", value_parser = values::number, allow_hyphen_values = true)]
     pub(crate) exposure: f64,
 
-    /// How radiance becomes the colours of a PNG: pbr-neutral, agx, srgb or none (linear)
+    /// How radiance becomes the colours of a PNG: pbr-neutral, agx, srgb or none (linear); shares of occlusion or albedo
+    /// want srgb, those of other values none, as `render` chooses by itself
     #[arg(long, value_name = "NAME", default_value = "pbr-neutral", value_parser = values::tone_mapping)]
     pub(crate) tone_mapping: ViewTransform,
+
+    /// Bits per channel of a PNG
+    #[arg(long, value_name = "8|16", default_value = "8", value_parser = values::bit_depth)]
+    pub(crate) bit_depth: u8,
+
+    /// One colour behind the model in a PNG, where the shares are transparent (as they are with the same option of
+    /// `render`): sRGB from 0 to 1, or #rrggbb
+    #[arg(long, value_name = "R,G,B", value_parser = values::color)]
+    pub(crate) background_color: Option<Color>,
 }
 
 #[derive(Args, Debug)]

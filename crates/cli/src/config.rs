@@ -68,7 +68,8 @@ fn read(path: &Path) -> io::Result<String> {
     if text.len() as u64 > MOST_BYTES { refused("a configuration file has at most 1 MiB") } else { Ok(text) }
 }
 
-/// The file's entries as arguments, but for those that add to a list which the command line begins anew.
+/// The file's entries as arguments, but for those that add to a list which the command line begins anew, and those that
+/// what was typed excludes.
 fn arguments(text: &str, argv: &[OsString]) -> Result<Vec<OsString>, String> {
     let table: Table = text.parse().map_err(|e: toml::de::Error| e.to_string().trim_end().to_owned())?;
     let mut program = Cli::command();
@@ -93,8 +94,11 @@ fn arguments(text: &str, argv: &[OsString]) -> Result<Vec<OsString>, String> {
         let words = words(arg, key, value, |name| option(name).is_some()).map_err(|e| format!("{key}: {e}"))?;
         check(&words).map_err(|e| format!("{key}: {e}"))?;
         let list = matches!(arg.get_action(), ArgAction::Append);
-        let retyped = typed.is_some_and(|m| m.value_source(arg.get_id().as_str()) == Some(ValueSource::CommandLine));
-        if !(list && retyped) {
+        let is_typed =
+            |a: &Arg| typed.is_some_and(|m| m.value_source(a.get_id().as_str()) == Some(ValueSource::CommandLine));
+        let excludes = |a: &Arg, b: &Arg| render.get_arg_conflicts_with(a).iter().any(|c| c.get_id() == b.get_id());
+        let excluded = render.get_arguments().any(|a| (excludes(a, arg) || excludes(arg, a)) && is_typed(a));
+        if !(excluded || list && is_typed(arg)) {
             out.extend(words.into_iter().map(OsString::from));
         }
     }
@@ -206,6 +210,14 @@ mod tests {
         assert_eq!(args.scene.clip_plane.iter().map(|p| p.normal.y).collect::<Vec<_>>(), [1.0]);
         assert!(args.run.verbose && !args.run.quiet);
         assert!(args.run.no_progress && !args.run.progress);
+    }
+
+    #[test]
+    fn what_is_typed_drives_out_what_it_excludes() {
+        let args = with("spp = 4\nnoise-threshold = 0.1", &["--samples-range", "16..32"]).unwrap();
+        assert_eq!((args.quality.samples_range, args.quality.spp), (Some((16, 32)), None));
+        let args = with("samples-range = \"16..32\"", &["-s", "9"]).unwrap();
+        assert_eq!((args.quality.samples_range, args.quality.spp), (None, Some(9)));
     }
 
     #[test]

@@ -1,11 +1,13 @@
 //! `firsthit render`: from a model to an image.
 
+use std::fs::File;
+use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use firsthit_accel::{BuildOptions, SceneBuilder};
-use firsthit_import::scene::{Pixels, Settings};
+use firsthit_import::scene::Settings;
 use firsthit_import::{Imported, Report};
 use firsthit_render::{
     Aov, Background, CameraChanges, Clip, EnvironmentChoice, IntegratorChoice, RenderOptions, Rendered, Stage,
@@ -22,7 +24,7 @@ use crate::merge;
 use crate::progress::{Keep, Progress, Style, duration};
 use crate::report::{Counts, RenderReport, Seconds, effects, explain_effects, rays_in_words, warnings};
 use crate::simd;
-use crate::target::Target;
+use crate::target::{Target, writable};
 use crate::values::{Hdri, Resolution, Switch};
 
 /// Renders a model as the arguments say.
@@ -36,6 +38,9 @@ pub(crate) fn run(args: &RenderArgs, config: Option<&Path>) -> Result<Exit, Fail
     if target == Target::Stdout && args.output.aov.is_some() {
         let failure = Failure::usage("`-o -` has no room for `--aov`");
         return Err(failure.hint("write to a file: -o FILE.exr holds them all"));
+    }
+    if let Some(path) = &args.quality.checkpoint {
+        writable(path)?;
     }
     if let Some(path) = config {
         console.say(format_args!("options from {}", path.display()));
@@ -76,15 +81,16 @@ impl Job<'_> {
         let stage_options = stage_options(args, &options, &self.target)?;
         seconds.load = started.elapsed().as_secs_f64();
 
-        let picture = self.words(&report, &options, &stage_options);
+        let asked = args.quality.checkpoint.is_some() || args.quality.resume.is_some();
+        let picture = if asked { self.words(&report, &options, &stage_options)? } else { String::new() };
         let start = match &args.quality.resume {
             Some(path) => {
-                let (start, of) = merge::read(path)?;
-                if of != picture {
+                let start = merge::open(path)?;
+                if start.picture() != picture {
                     let words = format_args!("{}: it is of another model or of other options", path.display());
                     return Err(Failure::failed(words).hint("repeat the options of the render that was put aside"));
                 }
-                Some(start)
+                Some(merge::read(start, path)?)
             }
             None => None,
         };
@@ -119,13 +125,15 @@ impl Job<'_> {
         let rendered = firsthit_render::render_from(&stage, &options, start, &progress);
         progress.finish();
         let rendered = rendered.map_err(|e| self.at_model(&e))?;
-        if let Some(path) = &args.quality.checkpoint {
-            write_checkpoint(path, &rendered.sums(), &picture).map_err(Failure::failed)?;
-        }
         seconds.render = started.elapsed().as_secs_f64();
 
         let started = Instant::now();
         let files = self.write(&rendered)?;
+        // Told of at the end: the picture is there.
+        let kept = match &args.quality.checkpoint {
+            Some(path) => write_checkpoint(path, &rendered.sums(), &picture).map_err(Failure::failed),
+            None => Ok(()),
+        };
         seconds.write = started.elapsed().as_secs_f64();
 
         if args.run.explain {
@@ -161,39 +169,62 @@ impl Job<'_> {
                 more_warnings: report.more_warnings,
             })?;
         }
+        kept?;
         // The picture is there to be looked at, whatever is said about it.
         self.console.bad_samples(rendered.stats.bad_samples, args.run.strict)?;
         Ok(if rendered.interrupted { Exit::Interrupted } else { Exit::Done })
     }
 
-    /// What decides the samples of a picture, in words: the files, and the options but for how many samples are taken.
-    fn words(&self, report: &Report, options: &RenderOptions, stage: &StageOptions) -> String {
-        let mut words = String::new();
-        for path in &report.files {
-            let length = std::fs::metadata(path).map_or(0, |m| m.len());
-            let name = path.file_name().unwrap_or_default().to_string_lossy();
-            words += &format!("{name} {length}\n");
+    /// What decides the samples of a picture, in words: the program, the files by name and content, and the options but
+    /// for how many samples are taken.
+    fn words(&self, report: &Report, options: &RenderOptions, stage: &StageOptions) -> Result<String, Failure> {
+        let mut files = Vec::new();
+        for path in report.files.iter().map(PathBuf::as_path).chain(self.hdri()) {
+            files.push(fingerprint(path).map_err(|e| Failure::failed(format_args!("{}: {e}", path.display())))?);
         }
+        files.sort();
         let mut options = options.clone();
         (options.spp, options.first_sample, options.noise_threshold, options.time_limit) = (16, 0, None, None);
-        let mut stage = stage.clone();
-        if let EnvironmentChoice::Map(image) = &mut stage.environment {
-            // Its pixels would fill the file.
-            image.pixels = Pixels::Rgba8(Arc::new([]));
+        if options.integrator == IntegratorChoice::Auto {
+            options.integrator = IntegratorChoice::Path;
         }
-        let (hdri, precision) = (&self.args.scene.hdri, self.args.quality.precision);
-        words + &format!("{options:?}\n{stage:?}\n{hdri:?} {precision:?} {:?}", self.args.scene.up)
+        let mut stage = stage.clone();
+        if let EnvironmentChoice::Map(_) = &stage.environment {
+            // Its file is among the others.
+            stage.environment = EnvironmentChoice::Auto;
+        }
+        let (scene, precision) = (&self.args.scene, self.args.quality.precision);
+        Ok(format!(
+            "firsthit {}\n{}\n{options:?}\n{stage:?}\n{precision:?} {:?} {:?} {}",
+            env!("CARGO_PKG_VERSION"),
+            files.join("\n"),
+            scene.up,
+            scene.variant,
+            // Which of the files it is.
+            self.hdri().and_then(Path::file_name).unwrap_or_default().to_string_lossy(),
+        ))
+    }
+
+    /// The image that gives light.
+    fn hdri(&self) -> Option<&Path> {
+        match &self.args.scene.hdri {
+            Some(Hdri::File(path)) => Some(path),
+            _ => None,
+        }
     }
 
     /// Refuses to write over a file that this render was made from.
     fn spare_what_was_read(&self, report: &Report) -> Result<(), Failure> {
-        let hdri = match &self.args.scene.hdri {
-            Some(Hdri::File(path)) => Some(path.as_path()),
-            _ => None,
-        };
         let aovs = self.args.output.aov.as_ref().map_or(&[][..], |list| &list.0);
         let read = report.files.iter().map(PathBuf::as_path);
-        self.target.spare(aovs, read.chain(hdri).chain(self.config))
+        let read: Vec<_> = read.chain(self.hdri()).chain(self.config).collect();
+        let quality = &self.args.quality;
+        self.target.spare(aovs, read.iter().copied().chain(quality.resume.as_deref()))?;
+        match &quality.checkpoint {
+            // It may go on in the file that it was resumed from.
+            Some(path) => self.target.spare_from(path, aovs, read.into_iter()),
+            None => Ok(()),
+        }
     }
 
     /// Writes the image and what belongs to it; the answer: the files, the image first.
@@ -229,12 +260,10 @@ impl Job<'_> {
             (false, true) => "time is up",
             (false, false) => "done",
         };
-        let window = rendered.film.window();
-        let pixels = f64::from(window.width) * f64::from(window.height);
         let noise = rendered.stats.noise.map_or(String::new(), |n| format!(", noise at most {n:.3}"));
         format!(
             "{done}: {counts}, {:.0} samples per pixel{noise}, {}; load {:.2} s, build {:.2} s, render {:.2} s; wrote {}",
-            rendered.stats.samples as f64 / pixels,
+            rendered.film.samples_per_pixel(),
             rays_in_words(&rendered.stats.rays),
             seconds.load,
             seconds.build,
@@ -246,6 +275,26 @@ impl Job<'_> {
     fn at_model(&self, error: &dyn std::error::Error) -> Failure {
         Failure::failed(format_args!("{}: {error}", self.args.model.display()))
     }
+}
+
+/// A file by its name, length and content (FNV-1a of 64 bits: against mix-ups, not against forgery).
+fn fingerprint(path: &Path) -> io::Result<String> {
+    let mut file = BufReader::new(File::open(path)?);
+    let (mut hash, mut length) = (0xcbf2_9ce4_8422_2325_u64, 0);
+    loop {
+        let bytes = file.fill_buf()?;
+        if bytes.is_empty() {
+            break;
+        }
+        for byte in bytes {
+            hash = (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3);
+        }
+        let count = bytes.len();
+        length += count;
+        file.consume(count);
+    }
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    Ok(format!("{name} {length} {hash:016x}"))
 }
 
 /// How many samples are taken.

@@ -27,29 +27,49 @@ impl Target {
         if path.is_dir() {
             return Err(Failure::failed(format_args!("{}: this is a folder, not a file", path.display())));
         }
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
-        if let Some(folder) = folder.filter(|f| !f.is_dir()) {
-            let failure = Failure::failed(format_args!("{}: there is no folder {}", path.display(), folder.display()));
-            return Err(failure.hint(format_args!("mkdir -p {}", folder.display())));
-        }
-        output::try_path(&path).map_err(Failure::failed)?;
+        writable(&path)?;
         Ok(Self::File(path, format))
     }
 
     /// Refuses if writing would replace one of the files that were read.
     pub(crate) fn spare<'a>(&self, aovs: &[Aov], read: impl Iterator<Item = &'a Path>) -> Result<(), Failure> {
-        let Self::File(path, _) = self else { return Ok(()) };
-        let written = output::files(path, aovs).map_err(Failure::usage)?;
-        // What does not exist yet replaces nothing.
-        let existing: Vec<_> = written.iter().filter_map(|f| Some((f, f.canonicalize().ok()?))).collect();
-        let read: Vec<_> = if existing.is_empty() { Vec::new() } else { read.flat_map(Path::canonicalize).collect() };
-        match existing.iter().find(|(_, full)| read.contains(full)) {
-            Some((file, _)) => {
+        match replaced(&self.files(aovs)?, read) {
+            Some(file) => {
                 let failure = format_args!("{}: the model was read from this file too", file.display());
                 Err(Failure::failed(failure).hint("write to another file: -o FILE"))
             }
             None => Ok(()),
         }
+    }
+
+    /// The files that an image with these pictures beside it is written to.
+    pub(crate) fn files(&self, aovs: &[Aov]) -> Result<Vec<PathBuf>, Failure> {
+        match self {
+            Self::Stdout => Ok(Vec::new()),
+            Self::File(path, _) => output::files(path, aovs).map_err(Failure::usage),
+        }
+    }
+
+    /// Refuses a checkpoint that would replace a file that is read, or that the image is written to.
+    pub(crate) fn spare_from<'a>(
+        &self,
+        checkpoint: &Path,
+        aovs: &[Aov],
+        read: impl Iterator<Item = &'a Path>,
+    ) -> Result<(), Failure> {
+        let hint = "keep it in another file: --checkpoint FILE";
+        let written = [checkpoint.to_owned()];
+        if replaced(&written, read).is_some() {
+            let failure = format_args!("{}: this file is read too", checkpoint.display());
+            return Err(Failure::failed(failure).hint(hint));
+        }
+        let images = self.files(aovs)?;
+        let same = |file: &PathBuf| std::path::absolute(file).ok() == std::path::absolute(checkpoint).ok();
+        if images.iter().any(same) || replaced(&written, images.iter().map(PathBuf::as_path)).is_some() {
+            let failure = format_args!("{}: the image is written to this file too", checkpoint.display());
+            return Err(Failure::usage(failure).hint(hint));
+        }
+        Ok(())
     }
 
     /// Whether it shows what a display shows, instead of radiance.
@@ -64,6 +84,23 @@ impl Target {
             Self::File(path, _) => path.display().to_string(),
         }
     }
+}
+
+/// Refuses a file that cannot be written, before any work is done for it.
+pub(crate) fn writable(path: &Path) -> Result<(), Failure> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+    if let Some(folder) = folder.filter(|f| !f.is_dir()) {
+        let failure = Failure::failed(format_args!("{}: there is no folder {}", path.display(), folder.display()));
+        return Err(failure.hint(format_args!("mkdir -p {}", folder.display())));
+    }
+    output::try_path(path).map_err(Failure::failed)
+}
+
+/// The first of some files to be written that is one of those that are read. What does not exist yet replaces nothing.
+fn replaced<'a, 'b>(written: &'b [PathBuf], read: impl Iterator<Item = &'a Path>) -> Option<&'b PathBuf> {
+    let existing: Vec<_> = written.iter().filter_map(|f| Some((f, f.canonicalize().ok()?))).collect();
+    let read: Vec<_> = if existing.is_empty() { Vec::new() } else { read.flat_map(Path::canonicalize).collect() };
+    existing.into_iter().find(|(_, full)| read.contains(full)).map(|(file, _)| file)
 }
 
 /// `models/helmet.glb` is rendered to `helmet.png`, `scan.obj.zst` to `scan.png`, the folder `v1.2` to `v1.2.png`;

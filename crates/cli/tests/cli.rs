@@ -385,6 +385,40 @@ fn a_render_is_put_aside_gone_on_with_and_joined_of_shares() {
 }
 
 #[test]
+fn a_checkpoint_replaces_nothing_that_is_read_or_written() {
+    let folder = Folder::new();
+    let bytes = |name: &str| std::fs::read(folder.path(name)).unwrap();
+    folder.render(&["-o", "a.png", "--checkpoint", "cube.mtl"]).fails(1, &["cube.mtl", "--checkpoint FILE"]);
+    folder.render(&["-o", "a.png", "--checkpoint", "a.png"]).fails(2, &["a.png", "the image is written"]);
+    assert!(!folder.path("a.png").exists(), "nothing was rendered");
+    folder.render(&["-o", "a.png", "--checkpoint", "none/a.sums"]).fails(1, &["mkdir -p none"]);
+    for (share, name) in [("0..16", "a.sums"), ("16..32", "b.sums")] {
+        let args = ["render", "cube.obj", "--resolution", "8x8", "--samples-range", share, "--checkpoint", name];
+        folder.run(&args).code(0);
+    }
+    let before = bytes("a.sums");
+    folder.run(&["merge", "a.sums", "b.sums", "-o", "m.png", "--checkpoint", "a.sums"]).fails(1, &["a.sums"]);
+    assert!(before == bytes("a.sums") && !folder.path("m.png").exists());
+    let view = ["--bit-depth", "16", "--background-color", "1,0,0", "--checkpoint", "m.sums"];
+    folder.run(&[&["merge", "a.sums", "b.sums", "-o", "m.png"], &view[..]].concat()).code(0);
+    folder.run(&["merge", "a.sums", "-o", "none/m.png"]).fails(1, &["mkdir -p none"]);
+}
+
+#[test]
+fn a_checkpoint_knows_its_scene_by_content() {
+    let folder = Folder::new();
+    let render = |args: &[&str]| folder.run(&[&["render", "cube.obj", "--resolution", "8x8"], args].concat());
+    render(&["-s", "4", "-o", "a.png", "--checkpoint", "a.sums"]).code(0);
+    // The default integrator by its name is the same picture.
+    let more = ["-s", "8", "-o", "a.png", "--resume", "a.sums"];
+    let run = render(&[&more[..], &["--integrator", "path"]].concat()).code(0);
+    assert!(run.stderr().contains("8 samples per pixel"), "{}", run.stderr());
+    // As long as before, with another colour in it.
+    folder.write("cube.mtl", "newmtl red\nKd 0.1 0.8 0.1\n");
+    render(&more).fails(1, &["a.sums", "another model"]);
+}
+
+#[test]
 fn explain_says_what_was_chosen_and_what_each_effect_cost() {
     let folder = Folder::new();
     let run = folder.render(&["--explain"]).code(0);

@@ -1,8 +1,10 @@
 //! Renders that are put aside: all that has been summed so far, to go on with later or to be joined with other shares.
 
+use std::collections::TryReserveError;
 use std::io::{self, Read, Write};
 
-use crate::film::{Accumulator, RECORD};
+use crate::film::Accumulator;
+use crate::noise::Tiles;
 use crate::{Aov, Crop, Film, RenderOptions};
 
 /// Where a render goes on.
@@ -43,6 +45,9 @@ pub enum CheckpointError {
     /// It is something else, or broken.
     #[error("this is no checkpoint, or not a whole one")]
     Format,
+    /// There is not enough memory for it.
+    #[error("there is not enough memory for it")]
+    Memory(#[from] TryReserveError),
     /// It is of another picture.
     #[error("it is of another picture: {0}")]
     Other(&'static str),
@@ -56,7 +61,7 @@ pub enum CheckpointError {
     },
 }
 
-const MAGIC: &[u8; 16] = b"firsthit film 1\n";
+const MAGIC: &[u8; 16] = b"firsthit film 2\n";
 /// Longer words about a picture are not read.
 const MOST_WORDS: u32 = 1 << 20;
 
@@ -92,6 +97,113 @@ impl Sums<'_> {
     }
 }
 
+/// A checkpoint of which only the head has been read: enough to see which picture it is of.
+#[derive(Debug)]
+pub struct CheckpointReader<R> {
+    input: R,
+    picture: String,
+    size: (u32, u32),
+    window: Crop,
+    aovs: Vec<Aov>,
+    rest: Rest,
+}
+
+impl<R: Read> CheckpointReader<R> {
+    /// Reads the head.
+    ///
+    /// # Errors
+    /// When it is no checkpoint, or reading fails.
+    pub fn new(mut input: R) -> Result<Self, CheckpointError> {
+        if bytes::<16>(&mut input)? != *MAGIC {
+            return Err(CheckpointError::Format);
+        }
+        let mut head = [0; 12];
+        for n in &mut head {
+            *n = u32::from_le_bytes(bytes(&mut input)?);
+        }
+        let [width, height, x, y, w, h, first, pass, threshold, tiles, aovs, words] = head;
+        let threshold = Some(f32::from_bits(threshold)).filter(|t| *t >= 0.0);
+        let samples = first.is_multiple_of(16) && first <= pass && pass <= RenderOptions::MOST_SAMPLES;
+        if !samples || words > MOST_WORDS || aovs as usize > Aov::ALL.len() {
+            return Err(CheckpointError::Format);
+        }
+        let mut picture = vec![0; words as usize];
+        input.read_exact(&mut picture).map_err(cut_off)?;
+        let picture = String::from_utf8(picture).map_err(|_| CheckpointError::Format)?;
+        let mut list: Vec<Aov> = Vec::new();
+        for _ in 0..aovs {
+            let name = bytes::<32>(&mut input)?;
+            let name = std::str::from_utf8(&name).map_err(|_| CheckpointError::Format)?;
+            let aov = name.trim_end().parse().map_err(|_| CheckpointError::Format)?;
+            if list.contains(&aov) {
+                return Err(CheckpointError::Format);
+            }
+            list.push(aov);
+        }
+        let window = Crop { x, y, width: w, height: h };
+        let options = RenderOptions { width, height, crop: Some(window), aovs: list, ..RenderOptions::default() };
+        options.check().map_err(|_| CheckpointError::Format)?;
+        let inside = |from: u32, size: u32, end: u32| from.checked_add(size).is_some_and(|sum| sum <= end);
+        if !inside(x, w, width) || !inside(y, h, height) || tiles as usize != Tiles::new(window).count() {
+            return Err(CheckpointError::Format);
+        }
+        let mut active = vec![0; tiles as usize];
+        input.read_exact(&mut active).map_err(cut_off)?;
+        let active = active.into_iter().map(|a| a != 0).collect();
+        let rest = Rest { first, pass, active, threshold };
+        Ok(Self { input, picture, size: (width, height), window, aovs: options.aovs, rest })
+    }
+
+    /// The words that say which picture it is of.
+    #[must_use]
+    pub fn picture(&self) -> &str {
+        &self.picture
+    }
+
+    /// The first of its samples.
+    #[must_use]
+    pub fn first_sample(&self) -> u32 {
+        self.rest.first
+    }
+
+    /// Reads the film. Memory is taken as bytes come, not by what the head says.
+    ///
+    /// # Errors
+    /// When numbers are none that a render has, when bytes are missing, or reading fails.
+    pub fn read(self) -> Result<Checkpoint, CheckpointError> {
+        let Self { mut input, size, window, aovs, rest, .. } = self;
+        let most = RenderOptions::MOST_SAMPLES.saturating_sub(rest.first);
+        let mut count = 0;
+        let film = Film::from_records(size, window, &aovs, |layer| {
+            let pixel = Accumulator::from_bytes(&bytes(&mut input)?);
+            if layer == 0 {
+                count = pixel.count();
+            }
+            let sound = pixel.count() == count && count <= most && pixel.is_sound(layer == 0);
+            if sound { Ok(pixel) } else { Err(CheckpointError::Format) }
+        })?;
+        if bytes::<16>(&mut input)? != *MAGIC {
+            return Err(CheckpointError::Format);
+        }
+        Ok(Checkpoint { film, rest })
+    }
+}
+
+/// So many bytes.
+fn bytes<const N: usize>(input: &mut impl Read) -> Result<[u8; N], CheckpointError> {
+    let mut bytes = [0; N];
+    input.read_exact(&mut bytes).map_err(cut_off)?;
+    Ok(bytes)
+}
+
+/// A file that ends too early is no whole checkpoint.
+fn cut_off(error: io::Error) -> CheckpointError {
+    match error.kind() {
+        io::ErrorKind::UnexpectedEof => CheckpointError::Format,
+        _ => CheckpointError::Io(error),
+    }
+}
+
 impl Checkpoint {
     /// As it is while the render goes on.
     #[must_use]
@@ -111,52 +223,9 @@ impl Checkpoint {
     /// # Errors
     /// When it is no checkpoint, or reading fails.
     pub fn read(input: &mut impl Read) -> Result<(Self, String), CheckpointError> {
-        let mut magic = [0; 16];
-        input.read_exact(&mut magic)?;
-        if magic != *MAGIC {
-            return Err(CheckpointError::Format);
-        }
-        let mut head = [0; 12];
-        for n in &mut head {
-            let mut bytes = [0; 4];
-            input.read_exact(&mut bytes)?;
-            *n = u32::from_le_bytes(bytes);
-        }
-        let [width, height, x, y, w, h, first, pass, threshold, tiles, aovs, words] = head;
-        let threshold = Some(f32::from_bits(threshold)).filter(|t| *t >= 0.0);
-        if words > MOST_WORDS || aovs as usize > Aov::ALL.len() {
-            return Err(CheckpointError::Format);
-        }
-        let mut picture = vec![0; words as usize];
-        input.read_exact(&mut picture)?;
-        let picture = String::from_utf8(picture).map_err(|_| CheckpointError::Format)?;
-        let mut list = Vec::new();
-        for _ in 0..aovs {
-            let mut name = [0; 32];
-            input.read_exact(&mut name)?;
-            let name = std::str::from_utf8(&name).map_err(|_| CheckpointError::Format)?;
-            list.push(name.trim_end().parse().map_err(|_| CheckpointError::Format)?);
-        }
-        let crop = Crop { x, y, width: w, height: h };
-        let options = RenderOptions { width, height, crop: Some(crop), aovs: list, ..RenderOptions::default() };
-        options.check().map_err(|_| CheckpointError::Format)?;
-        let mut film = Film::new(width, height, options.crop, &options.aovs).map_err(|_| CheckpointError::Format)?;
-        if film.window() != crop || tiles as usize != crate::noise::Tiles::new(crop).count() {
-            return Err(CheckpointError::Format);
-        }
-        let mut active = vec![0; tiles as usize];
-        input.read_exact(&mut active)?;
-        let active = active.into_iter().map(|a| a != 0).collect();
-        for pixel in film.records_mut() {
-            let mut bytes = [0; RECORD];
-            input.read_exact(&mut bytes)?;
-            *pixel = Accumulator::from_bytes(&bytes);
-        }
-        input.read_exact(&mut magic)?;
-        if magic != *MAGIC {
-            return Err(CheckpointError::Format);
-        }
-        Ok((Self { film, rest: Rest { first, pass, active, threshold } }, picture))
+        let reader = CheckpointReader::new(input)?;
+        let picture = reader.picture.clone();
+        Ok((reader.read()?, picture))
     }
 
     /// Adds the share that follows: its first sample must be the one after the last of each pixel here. The sums are
@@ -181,5 +250,57 @@ impl Checkpoint {
         }
         self.rest.pass = next.rest.pass;
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A checkpoint of 4 x 2 pixels with 20 samples each, beside them normals.
+    fn sound() -> Vec<u8> {
+        let mut film = Film::new(4, 2, None, &[Aov::Normal]).unwrap();
+        for pixel in film.records_mut() {
+            (0..20).for_each(|_| pixel.add([0.5, 0.25, 1.0, 1.0]));
+        }
+        let rest = Rest { first: 32, pass: 52, active: vec![true], threshold: None };
+        let mut out = Vec::new();
+        Sums { film: &film, rest: &rest }.write(&mut out, "words").unwrap();
+        out
+    }
+
+    fn refused(file: &[u8]) -> bool {
+        matches!(Checkpoint::read(&mut &*file), Err(CheckpointError::Format))
+    }
+
+    #[test]
+    fn what_is_cut_off_is_no_checkpoint() {
+        let file = sound();
+        assert_eq!(Checkpoint::read(&mut file.as_slice()).unwrap().0.samples(), 32..52);
+        assert!((0..file.len()).all(|end| refused(&file[..end])));
+    }
+
+    #[test]
+    fn numbers_that_no_render_has_are_refused() {
+        let file = sound();
+        let with = |at: usize, new: &[u8]| {
+            let mut bad = file.clone();
+            bad[at..at + new.len()].copy_from_slice(new);
+            refused(&bad)
+        };
+        let first = file.len() - 16 - 16 * crate::film::RECORD;
+        for x in [f64::NAN, f64::INFINITY, -1.0, 1e300] {
+            assert!((0..7).all(|i| with(first + 8 * i, &x.to_le_bytes())), "{x}");
+        }
+        for x in [f32::NAN, f32::INFINITY, -1.0] {
+            assert!((0..4).all(|i| with(first + 56 + 4 * i, &x.to_le_bytes())), "{x}");
+        }
+        // A pixel with another number of samples than its normal, or with too many.
+        assert!(with(first + 72, &19_u32.to_le_bytes()) && with(first + 72, &u32::MAX.to_le_bytes()));
+        // First sample and pass.
+        assert!(with(16 + 24, &8_u32.to_le_bytes()) && with(16 + 24, &64_u32.to_le_bytes()));
+        assert!(with(16 + 28, &u32::MAX.to_le_bytes()));
+        // A window that leaves the picture.
+        assert!(with(16 + 8, &1_u32.to_le_bytes()) && with(16 + 8, &u32::MAX.to_le_bytes()));
     }
 }

@@ -10,19 +10,20 @@ use crate::{Aov, Crop};
 const BLOCK: u32 = 16;
 
 /// Bytes of an [`Accumulator`] in a file.
-pub(crate) const RECORD: usize = 64;
+pub(crate) const RECORD: usize = 76;
 
 /// The samples of one pixel in one picture, summed in a way that does not depend on pauses.
 ///
 /// Each aligned block of 16 samples is summed in f32, the blocks in f64, both in order: rendering in several passes,
-/// wherever they are cut, gives the same bits as rendering at once. As the f64 total of f32 numbers is exact unless
-/// blocks differ by more than about 2^20, blocks rendered elsewhere can be added in any order as well.
+/// wherever they are cut, gives the same bits as rendering at once. The f64 sum of f32 numbers is exact as long as it is
+/// below 2^29 times the smallest of them, so blocks rendered elsewhere can be added in any order as well; beyond, the
+/// last bit of an f64 may differ.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Accumulator {
     total: [f64; 4],
+    /// Sums of the squares (rounded to f32) of whole blocks' sums.
+    squares: [f64; 3],
     block: [f32; 4],
-    /// Sums of the squares of whole blocks' sums.
-    squares: [f32; 3],
     count: u32,
 }
 
@@ -37,7 +38,7 @@ impl Accumulator {
         if self.count.is_multiple_of(BLOCK) {
             self.total = self.sum();
             for (square, x) in self.squares.iter_mut().zip(self.block) {
-                *square += x * x;
+                *square += f64::from((x * x).min(f32::MAX));
             }
             self.block = [0.0; 4];
         }
@@ -56,7 +57,7 @@ impl Accumulator {
         let block = f64::from(BLOCK);
         Some(std::array::from_fn(|c| {
             let mean = self.total[c] / n;
-            let spread = (f64::from(self.squares[c]) / n - mean * mean).max(0.0);
+            let spread = (self.squares[c] / n - mean * mean).max(0.0);
             // Of a block's mean, by the number of blocks but one; of the mean of all blocks.
             (spread / (block * block) / (n - 1.0)) as f32
         }))
@@ -72,10 +73,10 @@ impl Accumulator {
 
     /// For files.
     pub(crate) fn to_bytes(self) -> [u8; RECORD] {
-        let total = self.total.iter().flat_map(|x| x.to_le_bytes());
-        let floats = self.block.iter().chain(&self.squares).flat_map(|x| x.to_le_bytes());
+        let doubles = self.total.iter().chain(&self.squares).flat_map(|x| x.to_le_bytes());
+        let floats = self.block.iter().flat_map(|x| x.to_le_bytes());
         let mut bytes = [0; RECORD];
-        for (to, from) in bytes.iter_mut().zip(total.chain(floats).chain(self.count.to_le_bytes())) {
+        for (to, from) in bytes.iter_mut().zip(doubles.chain(floats).chain(self.count.to_le_bytes())) {
             *to = from;
         }
         bytes
@@ -84,14 +85,27 @@ impl Accumulator {
     /// From files.
     pub(crate) fn from_bytes(bytes: &[u8; RECORD]) -> Self {
         let double = |i: usize| f64::from_le_bytes(std::array::from_fn(|k| bytes[8 * i + k]));
-        let word = |i: usize| u32::from_le_bytes(std::array::from_fn(|k| bytes[32 + 4 * i + k]));
-        let float = |i: usize| f32::from_bits(word(i));
+        let word = |i: usize| u32::from_le_bytes(std::array::from_fn(|k| bytes[56 + 4 * i + k]));
         Self {
             total: std::array::from_fn(double),
-            block: std::array::from_fn(float),
-            squares: std::array::from_fn(|i| float(4 + i)),
-            count: word(7),
+            squares: std::array::from_fn(|i| double(4 + i)),
+            block: std::array::from_fn(|i| f32::from_bits(word(i))),
+            count: word(4),
         }
+    }
+
+    /// Whether samples can have added up to this. Light is never negative; other values may be.
+    pub(crate) fn is_sound(&self, light: bool) -> bool {
+        let most = f64::from(self.count) * f64::from(f32::MAX);
+        let least = if light { 0.0 } else { -most };
+        let sums = self.total.into_iter().chain(self.block.map(f64::from));
+        // No comparison with NaN holds.
+        sums.into_iter().all(|x| x >= least && x <= most)
+            && self.squares.iter().all(|x| *x >= 0.0 && *x <= most)
+            && self.total[3] >= 0.0
+            && self.block[3] >= 0.0
+            && self.sum()[3] <= f64::from(self.count)
+            && (!self.count.is_multiple_of(BLOCK) || self.block == [0.0; 4])
     }
 
     /// How many samples there are.
@@ -205,6 +219,35 @@ impl Film {
     /// The pictures beside the colour that samples add to, in the order of [`Band::pixel`].
     pub(crate) fn sampled(&self) -> impl Iterator<Item = Aov> {
         self.aovs.iter().copied().filter(|a| a.is_sampled())
+    }
+
+    /// As [`Film::new`], with pixels from elsewhere: all layers of the first, then those of the next. Memory is taken
+    /// as they come, whatever the size that is claimed.
+    pub(crate) fn from_records<E: From<TryReserveError>>(
+        (width, height): (u32, u32),
+        window: Crop,
+        aovs: &[Aov],
+        mut next: impl FnMut(usize) -> Result<Accumulator, E>,
+    ) -> Result<Self, E> {
+        const AT_FIRST: usize = 1 << 12;
+        let mut film = Self::new(width, height, Some(Crop { width: 0, height: 0, ..window }), aovs)?;
+        film.window = window;
+        let count = (window.width as usize).saturating_mul(window.height as usize).saturating_mul(film.layers);
+        for i in 0..count {
+            if i == film.pixels.capacity() {
+                film.pixels.try_reserve_exact(i.max(AT_FIRST).min(count - i))?;
+            }
+            film.pixels.push(next(i % film.layers)?);
+        }
+        Ok(film)
+    }
+
+    /// The mean number of samples of a pixel.
+    #[must_use]
+    pub fn samples_per_pixel(&self) -> f64 {
+        let colour = self.pixels.iter().step_by(self.layers);
+        let sum: u64 = colour.clone().map(|p| u64::from(p.count())).sum();
+        sum as f64 / colour.len().max(1) as f64
     }
 
     /// All pixels of all layers.
@@ -342,7 +385,7 @@ mod tests {
     use super::*;
 
     fn sample(i: u32) -> [f32; 4] {
-        let x = ((i * 2_654_435_761) >> 8) as f32 / (1 << 24) as f32;
+        let x = (i.wrapping_mul(2_654_435_761) >> 8) as f32 / (1 << 24) as f32;
         [x, 1e-3 * x, 1e3 * x, 1.0]
     }
 
@@ -364,6 +407,21 @@ mod tests {
         let exact: f64 = (0..100).map(|i| f64::from(sample(i)[0])).sum::<f64>() / 100.0;
         assert!((f64::from(whole.mean()[0]) - exact).abs() < 1e-6);
         assert_eq!((whole.count(), Accumulator::default().mean()), (100, [0.0; 4]));
+    }
+
+    /// Shares that are joined have the bits of one run, variance and all, also where squares need more bits than an f32.
+    #[test]
+    fn shares_give_the_bits_of_one_run() {
+        let run = |samples: std::ops::Range<u32>| {
+            let mut a = Accumulator::default();
+            samples.for_each(|i| a.add(sample(i)));
+            a
+        };
+        for cut in (16..1024).step_by(48) {
+            let mut joined = run(0..cut);
+            joined.join(&run(cut..1024));
+            assert_eq!(joined, run(0..1024), "cut at {cut}");
+        }
     }
 
     /// A million samples of the same value: the mean is that value, where an f32 sum would have stalled.

@@ -28,7 +28,7 @@ pub mod warp;
 
 pub use aov::Aov;
 pub use camera::{Camera, CameraError};
-pub use checkpoint::{Checkpoint, CheckpointError, Sums};
+pub use checkpoint::{Checkpoint, CheckpointError, CheckpointReader, Sums};
 pub use effects::{EffectEntry, EffectPlan, EffectSet};
 pub use film::Film;
 pub use light::environment::Environment;

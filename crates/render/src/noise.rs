@@ -50,9 +50,10 @@ impl Tiles {
         self.active.contains(&true)
     }
 
-    /// From here on only tiles get samples whose noise is above the threshold.
-    pub(crate) fn judge(&mut self, film: &Film, threshold: f32) {
-        let noise = self.noise(film);
+    /// From here on only tiles get samples whose noise is above the threshold. Only tiles whose pixels all have exactly
+    /// this many samples are judged: others have been, or will be when they have as many.
+    pub(crate) fn judge(&mut self, film: &Film, threshold: f32, samples: u32) {
+        let noise = self.noise(film, Some(samples));
         for (active, noise) in self.active.iter_mut().zip(noise) {
             *active &= !noise.is_some_and(|n| n <= threshold);
         }
@@ -60,11 +61,12 @@ impl Tiles {
 
     /// The noise of the noisiest tile; `None` where it is not known of all.
     pub(crate) fn most(&self, film: &Film) -> Option<f32> {
-        self.noise(film).into_iter().try_fold(0.0, |most: f32, n| n.map(|n| most.max(n)))
+        self.noise(film, None).into_iter().try_fold(0.0, |most: f32, n| n.map(|n| most.max(n)))
     }
 
-    /// The estimated noise of each tile: see [`crate::RenderOptions::noise_threshold`].
-    fn noise(&self, film: &Film) -> Vec<Option<f32>> {
+    /// The estimated noise of each tile, if its pixels have this many samples: see
+    /// [`crate::RenderOptions::noise_threshold`].
+    fn noise(&self, film: &Film, samples: Option<u32>) -> Vec<Option<f32>> {
         let window = self.window;
         let of_tile = |i: usize| {
             let (column, row) = (i as u32 % self.across, i as u32 / self.across);
@@ -74,6 +76,9 @@ impl Tiles {
             for y in top.max(window.y)..(top + TILE).min(window.y + window.height) {
                 for x in xs.clone() {
                     let pixel = film.of_color(x, y);
+                    if samples.is_some_and(|n| n != pixel.count()) {
+                        return None;
+                    }
                     let (mean, variance) = (pixel.mean(), pixel.variance()?);
                     for (m, v) in mean.into_iter().zip(variance) {
                         sum += f64::from(v) / (f64::from(m) * f64::from(m) + 0.01) / 3.0;
@@ -112,9 +117,11 @@ mod tests {
         // Values 0, 1, 0, 1: the variance of their mean is 1/12, at a mean of 1/2.
         let expected = (1.0_f32 / 12.0 / 0.26).sqrt();
         assert!((tiles.most(&film).unwrap() - expected).abs() < 1e-4);
-        tiles.judge(&film, 0.1);
+        tiles.judge(&film, 0.1, 48);
+        assert!(tiles.is_active(31, 3), "it has other samples than those it is judged by");
+        tiles.judge(&film, 0.1, 64);
         assert!(tiles.any() && tiles.is_active(32, 3) && !tiles.is_active(31, 3) && !tiles.is_active(10, 22));
-        tiles.judge(&film, 1.0);
+        tiles.judge(&film, 1.0, 64);
         assert!(!tiles.any());
     }
 }

@@ -15,7 +15,7 @@ pub struct RenderOptions {
     pub width: u32,
     /// Picture height, pixels.
     pub height: u32,
-    /// Samples per pixel, >= 1; with a noise threshold or a time limit the most of them.
+    /// Samples per pixel, from 1 to [`RenderOptions::MOST_SAMPLES`]; with a noise threshold or a time limit the most of them.
     pub spp: u32,
     /// The first sample, for a share of a render that is joined with others later: a multiple of 16, below `spp`.
     pub first_sample: u32,

@@ -46,6 +46,12 @@ pub enum RenderError {
         /// The one after the last.
         end: u32,
     },
+    /// More samples than [`RenderOptions::MOST_SAMPLES`].
+    #[error("{spp} samples per pixel are too many: at most {} are taken", RenderOptions::MOST_SAMPLES)]
+    TooManySamples {
+        /// How many were asked for.
+        spp: u32,
+    },
     /// What is to be gone on with is of another picture.
     #[error("the checkpoint is of a picture of another size, window or first sample, or with other pictures beside it")]
     OtherPicture,
@@ -61,8 +67,11 @@ pub enum RenderError {
 }
 
 impl RenderOptions {
-    /// Most bytes of a film with all its pictures: some 150 million pixels of colour alone.
-    pub const MOST_FILM_BYTES: u64 = 8 << 30;
+    /// Most bytes of a film with all its pictures: some 130 million pixels of colour alone.
+    pub const MOST_FILM_BYTES: u64 = 10 << 30;
+
+    /// Most samples of a pixel: what may be asked for as [`RenderOptions::spp`].
+    pub const MOST_SAMPLES: u32 = 1 << 24;
 
     /// Whether they describe a picture. [`render`] checks it too; this is for asking before a scene is prepared.
     ///
@@ -75,6 +84,9 @@ impl RenderOptions {
         }
         if self.spp == 0 {
             return Err(RenderError::NoSamples);
+        }
+        if self.spp > Self::MOST_SAMPLES {
+            return Err(RenderError::TooManySamples { spp: self.spp });
         }
         if !self.first_sample.is_multiple_of(16) || self.first_sample >= self.spp {
             return Err(RenderError::Share { first: self.first_sample, end: self.spp });
@@ -170,6 +182,7 @@ pub fn render_from<M: Monitor + ?Sized>(
             // The tile with the fewest samples says where.
             let least = film.records().map(Accumulator::count).min().unwrap_or(0);
             rest.pass = last_pass(options.first_sample + least);
+            judge(&mut tiles, &film, options, rest.pass);
         }
     }
     rest.threshold = options.noise_threshold;
@@ -220,6 +233,8 @@ struct Done {
     timing: Timing,
     samples: u64,
     bad: u64,
+    /// Whether something was left out because time was up.
+    late: bool,
 }
 
 impl Done {
@@ -228,6 +243,7 @@ impl Done {
         self.timing.add(&other.timing);
         self.samples += other.samples;
         self.bad += other.bad;
+        self.late |= other.late;
         self
     }
 }
@@ -311,13 +327,14 @@ impl<'a> Job<'a> {
     ) -> (Done, End) {
         let window = film.window();
         let bands = u64::from(window.height.div_ceil(BAND));
-        let total = bands * u64::from(self.options.spp);
+        let total = bands * u64::from(self.options.spp.saturating_sub(rest.pass));
         let (finished, rays) = (AtomicU64::new(0), AtomicU64::new(0));
         let mut done = Done::default();
         rest.active = tiles.active().to_vec();
         while rest.pass < self.options.spp && tiles.any() {
             let first = rest.pass;
             let last = next_pass(first).min(self.options.spp);
+            let mut whole = true;
             for some in (0..bands as usize).step_by(AT_ONCE) {
                 let pass = film
                     .par_bands_mut(BAND)
@@ -332,6 +349,7 @@ impl<'a> Job<'a> {
                         band_done
                     })
                     .reduce(Done::default, Done::and);
+                whole &= !pass.late;
                 done = done.and(pass);
                 if monitor.cancelled() {
                     return (done, End::Cancelled);
@@ -340,15 +358,12 @@ impl<'a> Job<'a> {
                     monitor.checkpoint(&Sums { film, rest });
                 }
             }
-            if self.is_late(first) {
-                // Not all of the pass was rendered, perhaps.
+            if !whole {
                 return (done, End::OutOfTime);
             }
             rest.pass = last;
-            if let Some(threshold) = self.options.noise_threshold {
-                tiles.judge(film, threshold);
-                rest.active = tiles.active().to_vec();
-            }
+            judge(tiles, film, self.options, last);
+            rest.active = tiles.active().to_vec();
             if self.is_late(last) && last < self.options.spp && tiles.any() {
                 return (done, End::OutOfTime);
             }
@@ -371,7 +386,8 @@ impl<'a> Job<'a> {
     ) -> Done {
         let mut done = Done::default();
         for y in band.rows() {
-            if monitor.cancelled() || self.is_late(samples.start) {
+            done.late = self.is_late(samples.start);
+            if done.late || monitor.cancelled() {
                 break;
             }
             for x in band.columns() {
@@ -429,12 +445,20 @@ impl<'a> Job<'a> {
     }
 }
 
+/// Leaves tiles alone that are good enough once all samples before this one are taken. Only whole blocks are judged, as
+/// they are in a render that has no pause here.
+fn judge(tiles: &mut Tiles, film: &Film, options: &RenderOptions, samples: u32) {
+    if let Some(threshold) = options.noise_threshold.filter(|_| samples.is_multiple_of(16)) {
+        tiles.judge(film, threshold, samples.saturating_sub(options.first_sample));
+    }
+}
+
 /// The sample after the last of the pass that begins with this one.
 fn next_pass(first: u32) -> u32 {
     match first {
         0 => 1,
         1..4 => 4,
-        n => (n / 16 + 1) * 16,
+        n => (n / 16 + 1).saturating_mul(16),
     }
 }
 
@@ -465,6 +489,15 @@ fn region(clip: &Clip) -> ClipRegion<f64> {
 mod tests {
     use super::*;
     use crate::Crop;
+
+    #[test]
+    fn samples_are_limited() {
+        let check = |first_sample, spp| RenderOptions { first_sample, spp, ..Default::default() }.check();
+        assert_eq!(check(0, RenderOptions::MOST_SAMPLES), Ok(()));
+        let spp = u32::MAX;
+        assert_eq!(check(u32::MAX - 15, spp), Err(RenderError::TooManySamples { spp }));
+        assert!(next_pass(u32::MAX) == u32::MAX && next_pass(u32::MAX - 15) == u32::MAX);
+    }
 
     #[test]
     fn memory_is_limited_for_all_pictures_together() {
