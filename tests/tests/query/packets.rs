@@ -97,6 +97,27 @@ fn shadow_rays_to_one_light() {
     }
 }
 
+/// Of one direction, but far from each other: such rays are given up as packets when they have visited too much, and
+/// packets are tried again later. Neighbours among them make some that are not given up.
+#[test]
+fn rays_side_by_side_that_begin_far_apart() {
+    let mesh = icosphere(7);
+    for precision in [Precision::Fast, Precision::Robust] {
+        let scene = scene(&mesh, DAffine3::IDENTITY, BuildOptions { precision, ..BuildOptions::default() });
+        let mut rng = Rng(7);
+        let mut at = DVec3::ZERO;
+        let rays: Vec<Ray<f64>> = (0..64 * 96)
+            .map(|k| {
+                let far = k / 512 % 2 == 0 || k % 32 == 0;
+                let step = DVec3::new(rng.signed(), rng.signed(), 0.0);
+                at = if far { step } else { at + step * 1e-3 };
+                Ray::new(DVec3::new(at.x, at.y, 2.0), DVec3::new(0.0, 0.02 * rng.signed(), -1.0))
+            })
+            .collect();
+        assert!(same(&scene, &rays, "side by side") > 1000);
+    }
+}
+
 /// Any of the guards may be missing; then there are no packets, or they must not tell.
 #[test]
 fn guards_make_no_difference_between_batches_and_single_rays() {

@@ -29,55 +29,81 @@ const GROUPS: usize = 4;
 /// Rays of a packet.
 pub(crate) const RAYS: usize = 8 * GROUPS;
 
+/// Nodes and leaves that a packet may visit: about as many as its rays would, one by one, in a large scene. Rays of one
+/// direction that begin far apart visit far more than that.
+const MOST_VISITS: u32 = 24 * RAYS as u32;
+
+/// After a packet that visited too much, so many at most go one by one before it is tried again.
+const LONGEST_PAUSE: u32 = 63;
+
 /// Room for a packet, to be used again for the next one.
 pub(crate) struct Packet<'a> {
     model: &'a Model,
     tree: &'a Wide8,
     transform: &'a Transform,
     groups: [Group; GROUPS],
+    /// How many packets are not tried, and how many will not be after the next that visits too much.
+    paused: u32,
+    pause: u32,
 }
 
 impl<'a> Packet<'a> {
     /// For the only instance of a scene.
     #[inline(always)]
     pub(crate) fn new(model: &'a Model, tree: &'a Wide8, transform: &'a Transform) -> Self {
-        Self { model, tree, transform, groups: [Group::default(); GROUPS] }
+        Self { model, tree, transform, groups: [Group::default(); GROUPS], paused: 0, pause: 1 }
     }
 
-    /// Whether rays may well go together: seen from a few of them, which is all that rays pay that do not.
+    /// Whether rays may well go together: seen from a few of them and from the packets before, which is all that rays pay
+    /// that do not.
     #[inline(always)]
-    pub(crate) fn suits(&self, rays: &[Ray<f64>; RAYS]) -> bool {
+    pub(crate) fn suits(&mut self, rays: &[Ray<f64>; RAYS]) -> bool {
         let Reference(_) = self.tree.root;
         if self.tree.root.is_leaf() {
             return false;
         }
         let (first, middle, last) = (&rays[0].direction, &rays[RAYS / 2 + 1].direction, &rays[RAYS - 1].direction);
-        narrow(first, last) && narrow(first, middle)
+        let suits = narrow(first, last) && narrow(first, middle);
+        if suits && self.paused > 0 {
+            self.paused -= 1;
+            return false;
+        }
+        suits
     }
 
-    /// The nearest hit of each ray.
+    /// The nearest hit of each ray; or false, and nothing is known: the rays do not go together after all.
     #[inline(always)]
-    pub(crate) fn closest<L: Lanes, T: Tier>(&mut self, rays: &[Ray<f64>; RAYS], hits: &mut [Option<Hit>]) {
-        self.trace::<L, T, false>(rays);
+    #[must_use]
+    pub(crate) fn closest<L: Lanes, T: Tier>(&mut self, rays: &[Ray<f64>; RAYS], hits: &mut [Option<Hit>]) -> bool {
+        if !self.trace::<L, T, false>(rays) {
+            return false;
+        }
         for (group, hits) in self.groups.iter_mut().zip(hits.as_chunks_mut::<8>().0) {
             group.finish::<L>(self.model, self.transform, hits);
         }
+        true
     }
 
-    /// Whether each ray hits anything.
+    /// Whether each ray hits anything; or false, as above.
     #[inline(always)]
-    pub(crate) fn any<L: Lanes, T: Tier>(&mut self, rays: &[Ray<f64>; RAYS], hits: &mut [bool]) {
-        self.trace::<L, T, true>(rays);
+    #[must_use]
+    pub(crate) fn any<L: Lanes, T: Tier>(&mut self, rays: &[Ray<f64>; RAYS], hits: &mut [bool]) -> bool {
+        if !self.trace::<L, T, true>(rays) {
+            return false;
+        }
         for (group, hits) in self.groups.iter().zip(hits.as_chunks_mut::<8>().0) {
             for (lane, hit) in hits.iter_mut().enumerate() {
                 *hit = group.hit >> lane & 1 == 1;
             }
         }
+        true
     }
 
+    /// Whether it was worth it.
     #[inline(always)]
-    fn trace<L: Lanes, T: Tier, const ANY: bool>(&mut self, rays: &[Ray<f64>; RAYS]) {
-        let Self { model, tree, transform, groups } = self;
+    fn trace<L: Lanes, T: Tier, const ANY: bool>(&mut self, rays: &[Ray<f64>; RAYS]) -> bool {
+        let Self { model, tree, transform, groups, .. } = self;
+        let mut visits = MOST_VISITS;
         let rays = rays.as_chunks::<8>().0;
         let entry = Entry { transform, extent: model.extent(), padded: T::PADDED };
         let mut left = [0; GROUPS];
@@ -102,8 +128,14 @@ impl<'a> Packet<'a> {
                 left[k] &= !lanes;
                 groups[k].wake::<L>(lanes, way.axes);
             }
-            trace::<L, T, ANY>(&among, groups, &way);
+            if trace::<L, T, ANY>(&among, groups, &way, &mut visits).is_break() {
+                self.paused = self.pause;
+                self.pause = (2 * self.pause + 1).min(LONGEST_PAUSE);
+                return false;
+            }
         }
+        self.pause = 1;
+        true
     }
 }
 

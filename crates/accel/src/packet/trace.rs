@@ -1,5 +1,7 @@
 //! The traversal of a packet.
 
+use core::ops::ControlFlow;
+
 use firsthit_geometry::{Ray, transform::Transform};
 use glam::{DVec3, Vec3};
 
@@ -39,13 +41,18 @@ impl<L: Lanes> Found<L> {
 }
 
 /// Traces the rays that are awake, all of which go one way: each finds its nearest hit, or `ANY` hit. The tree's root must
-/// be a node.
+/// be a node. It breaks where more nodes and leaves would be visited than are left.
 ///
 /// Nodes are met by the packet as a whole, nearer ones first; leaves by each ray, and its triangles by eight rays at once,
 /// or eight at once by a ray where few rays come so far. Whatever more is visited than a single ray would visit, the
 /// answers are the same: of a tier with padded boxes they do not depend on the tree.
 #[inline(always)]
-pub(super) fn trace<L: Lanes, T: Tier, const ANY: bool>(among: &Among<'_>, groups: &mut [Group], way: &Way) {
+pub(super) fn trace<L: Lanes, T: Tier, const ANY: bool>(
+    among: &Among<'_>,
+    groups: &mut [Group],
+    way: &Way,
+    visits: &mut u32,
+) -> ControlFlow<()> {
     let Among { tree, .. } = *among;
     let frustum = Frustum::<L>::new(groups, way.negative);
     let mut end = latest::<L>(groups);
@@ -79,11 +86,13 @@ pub(super) fn trace<L: Lanes, T: Tier, const ANY: bool>(among: &Among<'_>, group
             });
         }
         current = loop {
-            let Some(next) = key.or_else(|| keys.pop()) else { return };
+            let Some(next) = key.or_else(|| keys.pop()) else { return ControlFlow::Continue(()) };
             key = None;
             if f32::from_bits((next >> 32) as u32) > end.max(0.0) {
                 continue;
             }
+            let Some(fewer) = visits.checked_sub(1) else { return ControlFlow::Break(()) };
+            *visits = fewer;
             let slot = next as u32;
             let (parent, child) = (&tree.nodes[(slot >> 3) as usize], (slot & 7) as usize);
             let reference = Reference(parent.children[child]);
@@ -140,7 +149,7 @@ pub(super) fn trace<L: Lanes, T: Tier, const ANY: bool>(among: &Among<'_>, group
             if shortened {
                 end = latest::<L>(groups);
                 if ANY && end == f32::NEG_INFINITY {
-                    return;
+                    return ControlFlow::Continue(());
                 }
                 ends = L::splat(end);
             }

@@ -296,8 +296,8 @@ impl<T: Tier> Work for ClosestInPackets<'_, T> {
             (rays, hits) = (later, later_hits);
             if let Some(together) = now.first_chunk()
                 && packet.suits(together)
+                && packet.closest::<L, T>(together, now_hits)
             {
-                packet.closest::<L, T>(together, now_hits);
                 continue;
             }
             for (ray, hit) in now.iter().zip(now_hits) {
@@ -328,8 +328,8 @@ impl<T: Tier> Work for AnyInPackets<'_, T> {
             (rays, hits) = (later, later_hits);
             if let Some(together) = now.first_chunk()
                 && packet.suits(together)
+                && packet.any::<L, T>(together, now_hits)
             {
-                packet.any::<L, T>(together, now_hits);
                 continue;
             }
             for (ray, hit) in now.iter().zip(now_hits) {
