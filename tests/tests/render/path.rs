@@ -382,6 +382,9 @@ fn pauses_and_shares_leave_no_trace() {
             let resumed = render_from(&stage, &options, Some(kept(&part.sums())), &()).unwrap();
             assert_eq!(resumed.film, whole.film, "{threshold:?}, after {pieces} pieces");
         }
+        // Nothing is judged within a block, where the render without a pause judges nothing.
+        let part = render(&stage, &RenderOptions { spp: 37, ..options.clone() }, &()).unwrap();
+        assert_eq!(render_from(&stage, &options, Some(kept(&part.sums())), &()).unwrap().film, whole.film);
     }
     // With fewer samples first, and a lower threshold later.
     let options = RenderOptions { aovs, ..small(96) };
@@ -401,7 +404,7 @@ fn pauses_and_shares_leave_no_trace() {
     joined.join(&share(32, 48)).unwrap();
     joined.join(&share(48, 96)).unwrap();
     assert_eq!(joined.samples(), 0..96);
-    assert_eq!(joined.film.color(), whole.film.color());
+    assert_eq!(joined.film, whole.film, "variance and all");
     let other = RenderOptions { width: 47, ..options.clone() };
     assert!(render_from(&stage, &other, Some(joined), &()).is_err(), "another picture");
     assert!(render(&stage, &RenderOptions { first_sample: 8, ..options }, &()).is_err(), "not at a block");
