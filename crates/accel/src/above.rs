@@ -112,14 +112,19 @@ impl Above {
                     return ControlFlow::Continue(());
                 }
                 let local = if wide.nodes.is_empty() { None } else { wide.frame.enter(ray) };
-                let Some(local) = local else {
-                    // A single run, or a ray that has no room in the frame, though perhaps in a mesh.
+                // In the frame's units, and more than its own rounding.
+                let off = asked.off.max_element() / wide.frame.scale * 1.001;
+                let delta = local.as_ref().map_or(f32::NAN, |l| (f64::from(l.delta) + off).to_f32().next_up());
+                let Some(local) = local.filter(|_| delta < WIDEST) else {
+                    // A single run, or a ray that has no room in the frame, though perhaps in a mesh, or comes from so far
+                    // that any box may be met.
                     return visit(&self.order, probe).map_continue(drop);
                 };
                 let (reversed, prunes) = (probe.reversed(), probe.prunes());
                 let mut boxes = 0;
                 let mut leaf = |run: Range<usize>| visit(&self.order[run], probe);
-                let work = Walk { wide, ray: local, asked, reversed, prunes, leaf: &mut leaf, boxes: &mut boxes };
+                let work =
+                    Walk { wide, ray: local, delta, asked, reversed, prunes, leaf: &mut leaf, boxes: &mut boxes };
                 let flow = simd::run(wide.level, work);
                 probe.boxes(boxes);
                 flow
@@ -127,6 +132,10 @@ impl Above {
         }
     }
 }
+
+/// Boxes are met as if larger by less than this, in a frame of size near 1: reciprocals are below 2^60, and products of the
+/// two must stay far from infinity, or children that are missing would be met.
+const WIDEST: f32 = 1024.0;
 
 /// Where the scene's boxes are of single precision.
 #[derive(Clone, Debug)]
@@ -248,6 +257,8 @@ fn run_bounds(topology: &Topology, boxes: &[Aabb<f32>], leaf: Child) -> Aabb<f32
 struct Walk<'a> {
     wide: &'a Wide,
     ray: LocalRay,
+    /// By how much boxes are met as if larger.
+    delta: f32,
     asked: &'a Asked,
     reversed: bool,
     prunes: bool,
@@ -260,10 +271,7 @@ impl Work for Walk<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> ControlFlow<()> {
-        let Self { wide, ray, asked, reversed, prunes, leaf, boxes } = self;
-        // In the frame's units, and more than its own rounding.
-        let off = asked.off.max_element() / wide.frame.scale * 1.001;
-        let delta = (f64::from(ray.delta) + off).to_f32().next_up();
+        let Self { wide, ray, delta, asked, reversed, prunes, leaf, boxes } = self;
         let test = Boxes::<L>::new(ray.origin32, ray.direction32, delta);
         let t_min = L::splat(ray.box_t_min(asked.t_min));
         let mut t_max = ray.box_t_max(asked.t_max);
@@ -378,5 +386,15 @@ mod tests {
         let above = Above::new(&boxes, options(Layout::Wide8));
         let ray = Ray { origin: DVec3::ZERO, direction: DVec3::X * 1e-170, t_min: 0.0, t_max: f64::INFINITY };
         assert_eq!(visited(&above, &ray, true, &mut Off).len(), 20);
+        // From so far that its place is not known to within the scene.
+        let ray = Ray { origin: DVec3::new(1e300, 3e299, 0.5), direction: DVec3::NEG_X, ..ray };
+        assert_eq!(visited(&above, &ray, true, &mut Off).len(), 20);
+        let asked = Asked { off: DVec3::INFINITY, padded: true, ordered: true, t_min: 0.0, t_max: 1.0 };
+        let mut count = 0;
+        let flow = above.traverse(&Ray::new(DVec3::ZERO, DVec3::X), &asked, &mut Off, |run, _| {
+            count += run.len();
+            ControlFlow::Continue(1.0)
+        });
+        assert!(flow.is_continue() && count == 20);
     }
 }
