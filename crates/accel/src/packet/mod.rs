@@ -15,7 +15,7 @@ use glam::DVec3;
 
 pub(crate) use tier::Tier;
 
-use crate::layout::wide8::{Reference, Wide8};
+use crate::layout::wide8::Wide8;
 use crate::model::Model;
 use crate::simd::{Eight, Lanes};
 use crate::{Hit, HitId};
@@ -58,7 +58,6 @@ impl<'a> Packet<'a> {
     /// that do not.
     #[inline(always)]
     pub(crate) fn suits(&mut self, rays: &[Ray<f64>; RAYS]) -> bool {
-        let Reference(_) = self.tree.root;
         if self.tree.root.is_leaf() {
             return false;
         }
