@@ -27,7 +27,7 @@ pub(crate) fn subjects(models: &[PathBuf], up: Option<UpAxis>, console: Console)
 }
 
 /// The file's name; the whole path where two models have the same.
-fn name(path: &Path, all: &[PathBuf]) -> String {
+pub(crate) fn name(path: &Path, all: &[PathBuf]) -> String {
     let same = all.iter().filter(|other| other.file_name() == path.file_name()).count();
     match path.file_name() {
         Some(name) if same < 2 => name.to_string_lossy().into_owned(),

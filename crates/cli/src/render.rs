@@ -358,6 +358,7 @@ fn render_options(args: &RenderArgs, settings: &Settings) -> Result<RenderOption
             bounds: args.scene.clip_box,
             planes: args.scene.clip_plane.iter().map(|p| (p.normal, p.offset)).collect(),
         },
+        profile: false,
     })
 }
 

@@ -117,6 +117,45 @@ fn what_cannot_be_measured_or_written_is_refused_in_time() {
     }
 }
 
+/// A folder with a scene and its picture is compared; a model tells of time alone.
+#[test]
+fn scenes_are_rendered_and_compared_with_their_references() {
+    let folder = folder_with_model();
+    let reference = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/references/furnace_diffuse");
+    let args = ["bench", "--render", reference.to_str().unwrap(), "octa.obj", "--resolution", "32x18", "--spp", "1,4"];
+    let output = command(folder.path(), &[&args[..], &["-t", "2", "--json"]].concat()).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let json: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let rows = json["rows"].as_array().unwrap();
+    assert_eq!(rows.len(), 4);
+    for (i, row) in rows.iter().enumerate() {
+        assert_eq!(
+            (&row["scene"], &row["spp"]),
+            (&["furnace_diffuse", "octa.obj"][i / 2].into(), &[1, 4][i % 2].into())
+        );
+        assert_eq!(row["threads"], 2);
+        assert!(row["seconds"].as_f64().unwrap() > 0.0 && row["mrays_per_s"].as_f64().unwrap() > 0.0);
+        for field in ["mse", "trimmed_rel_mse", "mean_ratio", "efficiency", "cost"] {
+            assert_eq!(row[field].is_null(), i >= 2, "{field} of {row}");
+        }
+    }
+    // In a white furnace the picture is right at once.
+    assert!((rows[0]["mean_ratio"].as_f64().unwrap() - 1.0).abs() < 1e-4);
+    let (fewer, more) = (rows[2]["rays"].as_u64().unwrap(), rows[3]["rays"].as_u64().unwrap());
+    assert!(fewer >= 32 * 18 && more > 3 * fewer);
+    for parts in json["parts"].as_array().unwrap() {
+        let share = |part: &str| parts[part].as_f64().unwrap();
+        let sum: f64 = ["traversal", "shading", "texturing", "sampling"].into_iter().map(share).sum();
+        assert!(sum > 0.99 && sum < 1.0 + 1e-9 && share("traversal") > 0.0, "{parts}");
+    }
+    let table = stdout(&command(folder.path(), &["bench", "--render", "octa.obj", "--spp=1", "-t1"]).output().unwrap());
+    for words in ["1/(s x MSE)", "time: traversal", "octa.obj: there is no reference", "seed 0"] {
+        assert!(table.contains(words), "no '{words}' in {table}");
+    }
+    let refused = command(folder.path(), &["bench", "octa.obj", "--spp", "4"]).output().unwrap();
+    assert_eq!(refused.status.code(), Some(2), "samples are of renders");
+}
+
 /// The first Ctrl-C ends the measurement, and what there is so far is printed whole.
 #[cfg(unix)]
 #[test]
@@ -134,4 +173,21 @@ fn an_interrupted_measurement_ends_clean() {
     assert_eq!(output.status.code(), Some(130));
     let json: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert!(json["notes"].to_string().contains("interrupted"));
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_render_ends_clean() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut bench = command(folder.path(), &["bench", "--render", "--json", "--progress", "--spp", "65536"]);
+    let mut bench = bench.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut line = String::new();
+    std::io::BufRead::read_line(&mut std::io::BufReader::new(bench.stderr.as_mut().unwrap()), &mut line).unwrap();
+    assert!(line.contains("rendering"), "{line}");
+    let kill = Command::new("kill").args(["-INT", &bench.id().to_string()]).status().unwrap();
+    assert!(kill.success());
+    let output = bench.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130));
+    let json: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(json["rows"].as_array().unwrap().is_empty() && json["notes"].to_string().contains("interrupted"));
 }

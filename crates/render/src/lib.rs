@@ -39,5 +39,5 @@ pub use options::{
 };
 pub use render::{RenderError, Rendered, render, render_from};
 pub use stage::{Stage, StageError};
-pub use stats::{RayCounts, RayKind, RenderStats};
+pub use stats::{Breakdown, RayCounts, RayKind, RenderStats};
 pub use view::{View, ViewTransform};

@@ -40,6 +40,9 @@ pub struct RenderOptions {
     pub aovs: Vec<Aov>,
     /// Parts of space whose surfaces are cut away (section views).
     pub clip: Clip,
+    /// Times the parts of the work, on one pixel of seven, for [`RenderStats::breakdown`](crate::RenderStats): it
+    /// changes no picture, but takes time.
+    pub profile: bool,
 }
 
 impl Default for RenderOptions {
@@ -59,6 +62,7 @@ impl Default for RenderOptions {
             crop: None,
             aovs: Vec::new(),
             clip: Clip::default(),
+            profile: false,
         }
     }
 }

@@ -13,6 +13,7 @@ use crate::camera::{Cone, FilmCamera};
 use crate::checkpoint::Rest;
 use crate::film::{Accumulator, Band};
 use crate::filter::Filter;
+use crate::integrator::clock::{self, Clock};
 use crate::integrator::whitted::{Limits, Seen};
 use crate::integrator::{Timing, Tracer};
 use crate::material::lobes::LobeKind;
@@ -129,8 +130,9 @@ const MOST_BOUNCES: u32 = 1024;
 const BAND: u32 = 4;
 /// Between so many bands a checkpoint may be made.
 const AT_ONCE: usize = 64;
-/// Of so many pixels one is timed.
+/// Of so many pixels one is timed; with [`RenderOptions::profile`] more.
 const TIMED: u32 = 61;
+const PROFILED: u32 = 7;
 /// Textures are averaged over this share of a pixel: the samples of a pixel average the rest.
 const FOOTPRINT: f64 = 0.5;
 
@@ -213,6 +215,7 @@ pub fn render_from<M: Monitor + ?Sized>(
         bad_samples: done.bad,
         noise: tiles.most(&film),
         seconds: start.elapsed().as_secs_f64(),
+        breakdown: done.timing.parts.breakdown(done.timing.traversal(), clock::look()),
     };
     let (interrupted, out_of_time) = (end == End::Cancelled, end == End::OutOfTime);
     Ok(Rendered { film, stats, effects, interrupted, out_of_time, rest })
@@ -341,8 +344,9 @@ impl<'a> Job<'a> {
                     .skip(some)
                     .take(AT_ONCE)
                     .map(|mut band| {
+                        let clock = Clock::default();
                         let mut tracer = Tracer::<TEXTURES, FILTERED>::new(self.stage, &self.clip);
-                        let band_done = self.band(&mut tracer, &mut band, first..last, tiles, monitor);
+                        let band_done = self.band(&mut tracer, &clock, &mut band, first..last, tiles, monitor);
                         let finished = finished.fetch_add(u64::from(last - first), Ordering::Relaxed);
                         let rays = rays.fetch_add(band_done.rays.total(), Ordering::Relaxed) + band_done.rays.total();
                         monitor.progress(finished + u64::from(last - first), total, rays);
@@ -376,9 +380,10 @@ impl<'a> Job<'a> {
         first > self.options.first_sample && self.deadline.is_some_and(|end| Instant::now() >= end)
     }
 
-    fn band<const TEXTURES: bool, const FILTERED: bool, M: Monitor + ?Sized>(
+    fn band<'b, const TEXTURES: bool, const FILTERED: bool, M: Monitor + ?Sized>(
         &self,
-        tracer: &mut Tracer<'_, TEXTURES, FILTERED>,
+        tracer: &mut Tracer<'b, TEXTURES, FILTERED>,
+        clock: &'b Clock,
         band: &mut Band<'_>,
         samples: std::ops::Range<u32>,
         tiles: &Tiles,
@@ -394,17 +399,25 @@ impl<'a> Job<'a> {
                 if !tiles.is_active(x, y) {
                     continue;
                 }
-                tracer.timed = (x.wrapping_mul(31).wrapping_add(y.wrapping_mul(17))) % TIMED == 0;
+                let profiled = self.options.profile && matches!(self.method, Method::Path(_));
+                let place = x.wrapping_mul(31).wrapping_add(y.wrapping_mul(17));
+                tracer.timed = place.is_multiple_of(if profiled { PROFILED } else { TIMED });
+                tracer.clock = Some(clock).filter(|_| profiled && tracer.timed);
                 // What a pixel has it need not get again.
                 let from = self.options.first_sample + band.pixel(x, y)[0].count();
                 for sample in samples.start.max(from)..samples.end {
+                    let started = tracer.clock.map(|_| Instant::now());
                     done.bad += u64::from(!self.sample(tracer, band.pixel(x, y), x, y, sample));
+                    if let Some(started) = started {
+                        tracer.timing.parts.whole.note(started.elapsed());
+                    }
                     done.samples += 1;
                 }
             }
         }
         done.rays = tracer.counts;
         done.timing = tracer.timing;
+        done.timing.parts.add(&clock.parts());
         done
     }
 
@@ -418,7 +431,7 @@ impl<'a> Job<'a> {
         sample: u32,
     ) -> bool {
         let sampler = PixelSampler::of(self.options.sampler, self.options.seed, (x, y), sample);
-        let [dx, dy] = self.filter.offset(sampler.get2(Dimension::Pixel));
+        let [dx, dy] = self.filter.offset(tracer.draw2(&sampler, Dimension::Pixel));
         let at = [f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy];
         let ray = self.camera.ray(at);
         let screen = [(at[0] / f64::from(self.options.width)) as f32, (at[1] / f64::from(self.options.height)) as f32];

@@ -111,6 +111,25 @@ impl AddAssign for RayCounts {
     }
 }
 
+/// Shares of the time of samples, as measured on some pixels: in [0, 1], together at most 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Breakdown {
+    /// Rays on their way, with what hits are asked before they count (alpha, culling).
+    pub traversal: f64,
+    /// Look-ups of textures where paths scatter.
+    pub texturing: f64,
+    /// Sample points.
+    pub sampling: f64,
+}
+
+impl Breakdown {
+    /// The rest: camera, surfaces, materials, lights, sums.
+    #[must_use]
+    pub fn shading(&self) -> f64 {
+        1.0 - (self.traversal + self.texturing + self.sampling)
+    }
+}
+
 /// What a render did.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RenderStats {
@@ -126,6 +145,8 @@ pub struct RenderStats {
     pub noise: Option<f32>,
     /// Wall-clock seconds.
     pub seconds: f64,
+    /// Where the time went, by path tracing, if [`RenderOptions::profile`](crate::RenderOptions::profile) asks for it.
+    pub breakdown: Option<Breakdown>,
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ use firsthit_import::SceneDesc;
 use firsthit_import::scene::{SurfaceDesc, TriangleMesh};
 use glam::{DAffine3, DMat3, DVec3, Mat3, Vec2, Vec3, Vec4};
 
+use crate::integrator::clock::Clock;
 use crate::material::Colors;
 
 /// The scene's geometry with what shading needs beside the trees.
@@ -107,6 +108,7 @@ impl World {
             lift: DVec3::ZERO,
             width: 0.0,
             colors: Colors::All(1),
+            clock: None,
         }
     }
 
@@ -131,6 +133,7 @@ impl World {
             lift: DVec3::ZERO,
             width,
             colors: Colors::All(1),
+            clock: None,
         };
         if let Some(n) = surface.vertex_normal() {
             let n = surface.instance.normals * n;
@@ -172,9 +175,20 @@ pub(crate) struct Surface<'a> {
     width: f32,
     /// Which colours the path is about that came here.
     pub(crate) colors: Colors,
+    /// Times the look-ups of textures here.
+    pub(crate) clock: Option<&'a Clock>,
 }
 
 impl Surface<'_> {
+    /// A look-up of a texture here, timed if that is asked for.
+    #[inline]
+    pub(crate) fn timed<R>(&self, look_up: impl FnOnce() -> R) -> R {
+        match self.clock {
+            None => look_up(),
+            Some(clock) => clock.texturing(look_up),
+        }
+    }
+
     /// Barycentric weights of the second and third corner, or the shape's own parameters.
     pub(crate) fn parameters(&self) -> Vec2 {
         match self.part {

@@ -8,7 +8,7 @@ use firsthit_geometry::Precision;
 use firsthit_import::UpAxis;
 use firsthit_measure::bench::BenchRays;
 
-use crate::values;
+use crate::values::{self, Resolution};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -18,6 +18,9 @@ Examples:
       The same of two models, with a page of bars and charts.
   firsthit bench dragon.glb --precision robust --build fast,balanced,high --rays diffuse
   firsthit bench dragon.glb --layout wide8 --simd scalar,avx2,avx512 --json
+  firsthit bench --render tests/references/cornell helmet.glb --spp 4,16,64
+      Seconds, error and efficiency of path tracing by samples per pixel, and where the time goes. A folder with scene.json
+      and ref.exr is compared with that picture; of other models time and rays are told.
 
 The environment variable FIRSTHIT_SIMD forces the level of instructions, here and in render, inspect and accuracy MODEL;
 --simd wins over it.
@@ -26,15 +29,28 @@ Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted (what was measured 
 
 #[derive(Args, Debug)]
 #[command(args_override_self = true, after_help = EXAMPLES)]
-#[command(group = ArgGroup::new("what").required(true).multiple(true).args(["models", "builtin"]))]
+#[command(group = ArgGroup::new("what").required(true).multiple(true).args(["models", "builtin", "render"]))]
 pub(crate) struct BenchArgs {
-    /// Models to measure: .obj, .obj.zst, .gltf, .glb, .toml, .json
+    /// Models to measure: .obj, .obj.zst, .gltf, .glb, .toml, .json, or a folder with one of them
     #[arg(value_name = "MODEL")]
     pub(crate) models: Vec<PathBuf>,
 
     /// Measure the built-in model, a bumpy sphere
     #[arg(long)]
     pub(crate) builtin: bool,
+
+    /// Render instead, by path tracing: time, error and efficiency [default: of the built-in model]
+    #[arg(long, conflicts_with_all = ["rays", "layout", "precision", "simd", "build", "no_peers", "count", "html"])]
+    pub(crate) render: bool,
+
+    /// With --render: samples per pixel, comma-separated [default: 4,16,64,256; with --quick 4,16]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', requires = "render",
+        value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    pub(crate) spp: Vec<u32>,
+
+    /// With --render: width and height in pixels of scenes that do not say [default: 640x360]
+    #[arg(long, value_name = "WxH", requires = "render", value_parser = values::resolution)]
+    pub(crate) resolution: Option<Resolution>,
 
     /// Only these kinds of rays, comma-separated: primary, shadow, ao, diffuse, random [default: all]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
@@ -60,9 +76,9 @@ pub(crate) struct BenchArgs {
     #[arg(long)]
     pub(crate) no_peers: bool,
 
-    /// Threads of builds and of queries
-    #[arg(short, long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u16).range(1..=1024))]
-    pub(crate) threads: u16,
+    /// Threads of builds and of queries [default: 1; with --render one, then one per core]
+    #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub(crate) threads: Option<u16>,
 
     /// Rays of each kind
     #[arg(long, value_name = "N", default_value = "65536", value_parser = clap::value_parser!(u32).range(1..=1 << 26))]
@@ -72,9 +88,9 @@ pub(crate) struct BenchArgs {
     #[arg(long)]
     pub(crate) quick: bool,
 
-    /// Seed of all rays
-    #[arg(long, value_name = "N", default_value = "1")]
-    pub(crate) seed: u64,
+    /// Seed of all rays [default: 1; with --render 0]
+    #[arg(long, value_name = "N")]
+    pub(crate) seed: Option<u64>,
 
     /// The models' upward axis: +X, -X, +Y, -Y, +Z or -Z [default: what the format says, else +Y]
     #[arg(long, value_name = "AXIS", allow_hyphen_values = true)]

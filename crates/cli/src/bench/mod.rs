@@ -1,6 +1,7 @@
 //! `firsthit bench MODEL...`: how fast builds and queries are, on this model and machine.
 
 mod args;
+mod render;
 mod table;
 
 use std::time::Duration;
@@ -21,6 +22,9 @@ use crate::{measured, simd};
 /// Measures the models of the arguments.
 pub(crate) fn run(args: &BenchArgs) -> Result<Exit, Failure> {
     let console = Console::new(args.quiet, false);
+    if args.render {
+        return render::run(args, console);
+    }
     let options = options(args)?;
     if let Some(file) = &args.html {
         measured::check_target(file, &args.models)?;
@@ -50,16 +54,18 @@ pub(crate) fn run(args: &BenchArgs) -> Result<Exit, Failure> {
     Ok(if progress.cancelled() { Exit::Interrupted } else { Exit::Done })
 }
 
-fn options(args: &BenchArgs) -> Result<BenchOptions, Failure> {
-    fn or<T: Clone + PartialEq>(wanted: &[T], otherwise: Vec<T>) -> Vec<T> {
-        let mut each = Vec::new();
-        for item in wanted {
-            if !each.contains(item) {
-                each.push(item.clone());
-            }
+/// What is wanted, each once; else what is usual.
+fn or<T: Clone + PartialEq>(wanted: &[T], otherwise: Vec<T>) -> Vec<T> {
+    let mut each = Vec::new();
+    for item in wanted {
+        if !each.contains(item) {
+            each.push(item.clone());
         }
-        if each.is_empty() { otherwise } else { each }
     }
+    if each.is_empty() { otherwise } else { each }
+}
+
+fn options(args: &BenchArgs) -> Result<BenchOptions, Failure> {
     let usual = BenchOptions::default();
     Ok(BenchOptions {
         rays: or(&args.rays, usual.rays),
@@ -68,9 +74,9 @@ fn options(args: &BenchArgs) -> Result<BenchOptions, Failure> {
         levels: or(&args.simd, simd::forced()?.map_or(usual.levels, |level| vec![level])),
         builds: or(&args.build, vec![BuildQuality::default()]),
         peers: !args.no_peers,
-        threads: args.threads.into(),
+        threads: args.threads.map_or(usual.threads, Into::into),
         count: args.count as usize,
-        seed: args.seed,
+        seed: args.seed.unwrap_or(usual.seed),
         budget: if args.quick { Duration::from_secs(2) } else { usual.budget },
     })
 }

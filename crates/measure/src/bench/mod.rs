@@ -1,8 +1,9 @@
 //! How fast queries are on the user's own model and machine: every layout, tier and build that is asked for, and obvhs's
-//! own traversals beside them, in turn on the same rays.
+//! own traversals beside them, in turn on the same rays. And how fast pictures become good: [`run_renders`].
 
 mod engine;
 mod rays;
+mod render;
 mod result;
 
 use std::time::{Duration, Instant};
@@ -19,6 +20,7 @@ use crate::timing::{Paired, Spread, quantile};
 use self::engine::{Asked, Engine, Spec};
 pub use self::rays::BenchRays;
 use self::rays::{Set, ray_sets};
+pub use self::render::{PartsRow, RenderBench, RenderBenchOptions, RenderRow, RenderSubject, run_renders};
 pub use self::result::{Bench, BenchModel, BuildRow, SpeedRow};
 
 /// What to measure: every combination of layouts, tiers, levels and builds.

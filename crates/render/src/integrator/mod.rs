@@ -7,6 +7,7 @@
 //! | [`direct`] | the light that reaches one point from all lights |
 //! | [`ao`] | how much of the hemisphere over a point is free |
 //! | [`aov`] | what is there: depth, normals, ids |
+//! | [`clock`] | where the time goes, on pixels that are timed |
 //!
 //! All cast their rays through a [`Tracer`], which applies section planes, alpha and culling, and counts. It is
 //! specialised by what the scene calls for; a sample is a pure function of (seed, pixel, sample number), and its
@@ -14,6 +15,7 @@
 
 pub(crate) mod ao;
 pub(crate) mod aov;
+pub(crate) mod clock;
 mod direct;
 pub(crate) mod path;
 mod scatter;

@@ -178,13 +178,14 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
         walk.cone.width += walk.cone.spread * hit.t;
         let mut surface = stage.world.surface(hit, point, wo, walk.cone.width as f32);
         surface.colors = walk.colors;
+        surface.clock = self.clock;
         let index = stage.world.material(hit.id);
         let material = &stage.materials[index];
 
         if FILTERED && material.has_alpha() && walk.layers < MOST_LAYERS {
             let covered = material.coverage::<TEXTURES>(&surface);
             let layer = sampler.branch(walk.layers);
-            if covered < 1.0 && layer.get1(Dimension::Alpha(walk.bounce)) >= covered {
+            if covered < 1.0 && self.draw1(&layer, Dimension::Alpha(walk.bounce)) >= covered {
                 walk.pass(&surface, RayKind::Transparency);
                 return true;
             }
@@ -222,8 +223,9 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
             seen.color += walk.throughput * self.ask(&vertex, &shading.bsdf, limits);
             asked = Some((receiver, shares));
         }
-        let choice = || sampler.get1(Dimension::Lobe(walk.bounce));
-        let Some(on) = scatter.sample(choice, sampler.get2(Dimension::Direction(walk.bounce))) else { return false };
+        let choice = || self.draw1(&sampler, Dimension::Lobe(walk.bounce));
+        let direction = self.draw2(&sampler, Dimension::Direction(walk.bounce));
+        let Some(on) = scatter.sample(choice, direction) else { return false };
         let direction = shading.bsdf.world(on.wi).as_dvec3().normalize();
         let through = on.wi.z < 0.0;
         // A shading normal may send a reflection below the surface, or a refraction above it.
@@ -280,7 +282,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
         if walk.bounce > ROULETTE {
             let chance = walk.throughput.max_element() / (DIM * walk.scale);
             if chance < 1.0 {
-                if !(sampler.get1(Dimension::Roulette(walk.bounce)) < chance) {
+                if !(self.draw1(&sampler, Dimension::Roulette(walk.bounce)) < chance) {
                     return false;
                 }
                 walk.throughput /= chance;
@@ -304,13 +306,13 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
         let stage = self.stage;
         let lights = &stage.lights;
         let choice = &lights.choice;
-        let u = if choice.is_single() { 0.0 } else { at.sampler.get1(Dimension::LightChoice(at.bounce)) };
+        let u = if choice.is_single() { 0.0 } else { self.draw1(&at.sampler, Dimension::LightChoice(at.bounce)) };
         let all_followed = limits.follow.contains(LobeKind::DIFFUSE);
         let mut light = Vec3::ZERO;
         if !all_followed && let Some(environment) = &lights.environment {
             // What is not followed must find all of the surroundings this way.
             let sampler = at.sampler.branch(1);
-            if let Some(s) = environment.sample(sampler.get2(Dimension::LightPosition(at.bounce))) {
+            if let Some(s) = environment.sample(self.draw2(&sampler, Dimension::LightPosition(at.bounce))) {
                 light += self.arrives_at(at, bsdf, &from_around(s, 1.0), RayKind::ShadowEnvironment);
             }
         }
@@ -318,7 +320,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
             return light;
         };
         let from = at.surface.point.position;
-        let u = at.sampler.get2(Dimension::LightPosition(at.bounce));
+        let u = self.draw2(&at.sampler, Dimension::LightPosition(at.bounce));
         let (sample, kind) = match chosen {
             Chosen::Punctual(i) => {
                 let sample = lights.punctual[i].sample(from, u);

@@ -7,6 +7,7 @@ use firsthit_geometry::Ray;
 use firsthit_geometry::clip::ClipRegion;
 use glam::{DVec3, Vec3};
 
+use super::clock::{Clock, Parts, Spent};
 use crate::light::{LightEnd, LightSample};
 use crate::material::Colors;
 use crate::sampler::{Dimension, PixelSampler};
@@ -17,6 +18,7 @@ use crate::{EffectSet, RayCounts, RayKind, Stage};
 pub(crate) struct Timing {
     seconds: [f64; RayKind::ALL.len()],
     rays: [u64; RayKind::ALL.len()],
+    pub(crate) parts: Parts,
 }
 
 impl Timing {
@@ -25,11 +27,17 @@ impl Timing {
             self.seconds[k] += other.seconds[k];
             self.rays[k] += other.rays[k];
         }
+        self.parts.add(&other.parts);
     }
 
     pub(crate) fn seconds_per_ray(&self, kind: RayKind) -> Option<f64> {
         let k = kind as usize;
         (self.rays[k] > 0).then(|| self.seconds[k] / self.rays[k] as f64)
+    }
+
+    /// Rays of all kinds.
+    pub(crate) fn traversal(&self) -> Spent {
+        Spent { seconds: self.seconds.iter().sum(), spans: self.rays.iter().sum() }
     }
 
     fn note(&mut self, kind: RayKind, time: Duration) {
@@ -74,6 +82,8 @@ pub(crate) struct Tracer<'a, const TEXTURES: bool, const FILTERED: bool> {
     pub(crate) timing: Timing,
     /// Whether the rays of the current pixel are timed.
     pub(crate) timed: bool,
+    /// Times what is not rays on such pixels, if that is asked for.
+    pub(crate) clock: Option<&'a Clock>,
 }
 
 impl<'a, const TEXTURES: bool, const FILTERED: bool> Tracer<'a, TEXTURES, FILTERED> {
@@ -91,12 +101,31 @@ impl<'a, const TEXTURES: bool, const FILTERED: bool> Tracer<'a, TEXTURES, FILTER
             counts: RayCounts::default(),
             timing: Timing::default(),
             timed: false,
+            clock: None,
         }
     }
 
     /// Which colour a camera ray's path follows once colours are parted; nothing is drawn where they never are.
     pub(super) fn colors(&self, sampler: PixelSampler) -> Colors {
         if self.disperses { Colors::chosen_by(sampler.get1(Dimension::Color)) } else { Colors::All(1) }
+    }
+
+    /// Sample points for one use.
+    #[inline]
+    pub(crate) fn draw2(&self, sampler: &PixelSampler, dimension: Dimension) -> [f32; 2] {
+        match self.clock {
+            None => sampler.get2(dimension),
+            Some(clock) => clock.sampling(|| sampler.get2(dimension)),
+        }
+    }
+
+    /// A number for one use.
+    #[inline]
+    pub(super) fn draw1(&self, sampler: &PixelSampler, dimension: Dimension) -> f32 {
+        match self.clock {
+            None => sampler.get1(dimension),
+            Some(clock) => clock.sampling(|| sampler.get1(dimension)),
+        }
     }
 
     /// The ray inside what is shown.

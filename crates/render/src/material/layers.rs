@@ -206,7 +206,7 @@ impl Layers {
         let (mut direction, mut strength, mut set) = (brushed.rotation, brushed.strength, 0);
         if let Some(t) = brushed.texture.as_ref().filter(|_| TEXTURES) {
             set = t.uv_set();
-            let texel = t.color(surface.uv(set), surface.footprint(set));
+            let texel = surface.timed(|| t.color(surface.uv(set), surface.footprint(set)));
             let along = texel.xy() * 2.0 - 1.0;
             direction = brushed.rotation.rotate(along.try_normalize().unwrap_or(Vec2::X));
             strength *= texel.z;
@@ -236,7 +236,7 @@ pub(super) fn mapped<const TEXTURES: bool>(
     scale: f32,
 ) -> Option<Vec3> {
     let t = texture.filter(|_| TEXTURES)?;
-    let texel = t.color(surface.uv(t.uv_set()), surface.footprint(t.uv_set()));
+    let texel = surface.timed(|| t.color(surface.uv(t.uv_set()), surface.footprint(t.uv_set())));
     let n = (texel.xyz() * 2.0 - 1.0) * Vec3::new(scale, scale, 1.0);
     if n.is_finite() && n.xy() != Vec2::ZERO { surface.mapped_normal(n, t.uv_set()) } else { None }
 }

@@ -75,14 +75,14 @@ pub(super) fn absorption(desc: &PbrMaterial, conventions: Conventions) -> Vec3 {
 /// The share of the colour texture, scalar textures and vertex colour of a point: 1 where there is none.
 pub(super) fn scalar<const TEXTURES: bool>(lookup: Option<&TextureLookup>, surface: &Surface<'_>) -> f32 {
     match lookup {
-        Some(t) if TEXTURES => t.scalar(surface.uv(t.uv_set()), surface.footprint(t.uv_set())),
+        Some(t) if TEXTURES => surface.timed(|| t.scalar(surface.uv(t.uv_set()), surface.footprint(t.uv_set()))),
         _ => 1.0,
     }
 }
 
 pub(super) fn color<const TEXTURES: bool>(lookup: Option<&TextureLookup>, surface: &Surface<'_>) -> glam::Vec4 {
     match lookup {
-        Some(t) if TEXTURES => t.color(surface.uv(t.uv_set()), surface.footprint(t.uv_set())),
+        Some(t) if TEXTURES => surface.timed(|| t.color(surface.uv(t.uv_set()), surface.footprint(t.uv_set()))),
         _ => glam::Vec4::ONE,
     }
 }
@@ -351,7 +351,7 @@ impl Pbr {
         if let Some(t) = &self.bump_texture {
             let (uv, width) = (surface.uv(t.uv_set()), surface.footprint(t.uv_set()));
             let step = t.texel_step().max(width);
-            let height = |du, dv| t.scalar(uv + glam::Vec2::new(du, dv), width);
+            let height = |du, dv| surface.timed(|| t.scalar(uv + glam::Vec2::new(du, dv), width));
             let half = 0.5 * step;
             let slope = glam::Vec2::new(height(half, 0.0) - height(-half, 0.0), height(0.0, half) - height(0.0, -half))
                 * (self.bump_scale / step);
