@@ -4,8 +4,11 @@
 //! * `cargo run --release -p firsthit-benches --bin peers`: speed, memory, build time and wrong answers, firsthit beside
 //!   its peers.
 //! * `cargo run --release -p firsthit-benches --bin growth`: time of a ray as one mesh grows from 1,000 triangles to 10 M.
+//! * `cargo run --release -p firsthit-benches --bin effects`: what it buys that scenes are rendered by kernels without the
+//!   effects that they do not call for.
 //! * `cargo run --release -p firsthit-benches --bin leaks`: rays lost through closed meshes, firsthit beside its peers.
 
+pub mod effects;
 pub mod engine;
 pub mod generated;
 pub mod growth;

@@ -1,4 +1,4 @@
-//! What a race came to, with all that must be known to read it later.
+//! What a measurement came to, with all that must be known to read it later.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -10,9 +10,9 @@ use serde::Serialize;
 use crate::race::Row;
 use crate::{peer, summary};
 
-/// A race and where it was run.
+/// A measurement and where it was made.
 #[derive(Clone, Debug, Serialize)]
-pub struct Record {
+pub struct Record<R> {
     /// The day, as 2026-01-31.
     pub date: String,
     /// Version of firsthit.
@@ -38,13 +38,13 @@ pub struct Record {
     /// What the user should know.
     pub notes: Vec<String>,
     /// The rows.
-    pub rows: Vec<Row>,
+    pub rows: Vec<R>,
 }
 
-impl Record {
+impl<R: Serialize> Record<R> {
     /// Looks at the machine and at the folder of this crate.
     #[must_use]
-    pub fn new(threads: usize, repetitions: usize, notes: Vec<String>, rows: Vec<Row>) -> Self {
+    pub fn new(threads: usize, repetitions: usize, notes: Vec<String>, rows: Vec<R>) -> Self {
         let cpus = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
         let cpu = cpus.lines().find_map(|l| Some(l.strip_prefix("model name")?.split_once(':')?.1.trim().to_owned()));
         let days = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs() / 86_400);
@@ -68,46 +68,58 @@ impl Record {
         }
     }
 
-    /// The whole as Markdown.
+    /// Where and how it was made, and the notes, as Markdown.
     #[must_use]
-    pub fn markdown(&self) -> String {
+    pub fn circumstances(&self) -> String {
         let compiled = match self.compiled_for.as_str() {
             "" => "stock build".to_owned(),
             more => format!("compiled for {more}"),
         };
         let notes: String = self.notes.iter().map(|n| format!("- {n}\n")).collect();
         format!(
-            "# Peers, {}\n\nfirsthit {} at {}; {}, {compiled}; {}, {} cores, {}; threads: {}; best and median of {} \
-             repetitions; {}.\n\n{notes}\nBest repetitions against best repetitions:\n\n{}{}",
+            "firsthit {} at {}; {}, {compiled}; {}, {} cores, {}; threads: {}; {} repetitions.\n\n{notes}",
+            self.version, self.commit, self.rustc, self.cpu, self.cores, self.os, self.threads, self.repetitions,
+        )
+    }
+
+    /// Writes PREFIXDATE.json and PREFIXDATE.md into a folder, and says where; a second record of a day has a letter
+    /// behind it.
+    ///
+    /// # Errors
+    /// When they cannot be written.
+    pub fn write_as(&self, folder: &Path, prefix: &str, markdown: &str) -> io::Result<[PathBuf; 2]> {
+        let date = format!("{prefix}{}", self.date);
+        let stems = (b'a'..=b'z').map(|c| if c == b'a' { date.clone() } else { format!("{date}{}", c as char) });
+        let path = |stem: &str, end: &str| folder.join(format!("{stem}.{end}"));
+        let stem = stems.into_iter().find(|s| !path(s, "json").exists()).unwrap_or_else(|| date.clone());
+        let files = [path(&stem, "json"), path(&stem, "md")];
+        fs::create_dir_all(folder)?;
+        fs::write(&files[0], serde_json::to_string_pretty(self)? + "\n")?;
+        fs::write(&files[1], markdown)?;
+        Ok(files)
+    }
+}
+
+impl Record<Row> {
+    /// The race as Markdown.
+    #[must_use]
+    pub fn markdown(&self) -> String {
+        format!(
+            "# Peers, {}\n\n{}\n{}.\n\nBest repetitions against best repetitions:\n\n{}{}",
             self.date,
-            self.version,
-            self.commit,
-            self.rustc,
-            self.cpu,
-            self.cores,
-            self.os,
-            self.threads,
-            self.repetitions,
+            self.circumstances(),
             self.versions.join(", "),
             summary::figures(&self.rows),
             summary::tables(&self.rows)
         )
     }
 
-    /// Writes DATE.json and DATE.md into a folder, and says where; a second record of a day has a letter behind it.
+    /// Writes DATE.json and DATE.md: see [`Record::write_as`].
     ///
     /// # Errors
     /// When they cannot be written.
     pub fn write(&self, folder: &Path) -> io::Result<[PathBuf; 2]> {
-        let stems =
-            (b'a'..=b'z').map(|c| if c == b'a' { self.date.clone() } else { format!("{}{}", self.date, c as char) });
-        let path = |stem: &str, end: &str| folder.join(format!("{stem}.{end}"));
-        let stem = stems.into_iter().find(|s| !path(s, "json").exists()).unwrap_or_else(|| self.date.clone());
-        let (json, markdown) = (path(&stem, "json"), path(&stem, "md"));
-        fs::create_dir_all(folder)?;
-        fs::write(&json, serde_json::to_string_pretty(self)? + "\n")?;
-        fs::write(&markdown, self.markdown())?;
-        Ok([json, markdown])
+        self.write_as(folder, "", &self.markdown())
     }
 }
 

@@ -60,6 +60,16 @@ bitflags! {
 }
 
 impl EffectSet {
+    /// Those by which light goes through surfaces.
+    pub(crate) const THROUGH: Self =
+        Self::REFRACTION.union(Self::TRANSMISSION).union(Self::ABSORPTION).union(Self::DISPERSION);
+    /// Those of what is laid over the base of a material.
+    pub(crate) const LAYERS: Self = Self::CLEARCOAT
+        .union(Self::SHEEN)
+        .union(Self::IRIDESCENCE)
+        .union(Self::ANISOTROPY)
+        .union(Self::DIFFUSE_TRANSMISSION);
+
     /// Every single effect with the name that command lines and reports use, in the order of reports.
     pub const NAMES: [(Self, &'static str); 24] = [
         (Self::SHADOWS, "shadows"),

@@ -9,6 +9,7 @@ pub mod film;
 pub mod filter;
 pub mod framing;
 mod integrator;
+mod kernel;
 pub mod light;
 mod material;
 mod monitor;
@@ -31,6 +32,7 @@ pub use camera::{Camera, CameraError};
 pub use checkpoint::{Checkpoint, CheckpointError, CheckpointReader, Sums};
 pub use effects::{EffectEntry, EffectPlan, EffectSet};
 pub use film::Film;
+pub use kernel::KernelChoice;
 pub use light::environment::Environment;
 pub use monitor::Monitor;
 pub use options::{

@@ -16,12 +16,13 @@ use crate::filter::Filter;
 use crate::integrator::clock::{self, Clock};
 use crate::integrator::whitted::{Limits, Seen};
 use crate::integrator::{Timing, Tracer};
+use crate::kernel::{Clear, Filtered, Full, Kernel, Plain, Textured, TexturedFiltered};
 use crate::material::lobes::LobeKind;
 use crate::noise::Tiles;
 use crate::sampler::{Dimension, PixelSampler};
 use crate::{
-    Aov, Checkpoint, Clip, EffectPlan, EffectSet, Film, FilterChoice, IntegratorChoice, Monitor, RayCounts,
-    RenderOptions, RenderStats, Stage, Sums,
+    Aov, Checkpoint, Clip, EffectPlan, EffectSet, Film, FilterChoice, IntegratorChoice, KernelChoice, Monitor,
+    RayCounts, RenderOptions, RenderStats, Stage, Sums,
 };
 
 /// Options that no picture can be made with.
@@ -165,6 +166,16 @@ pub fn render_from<M: Monitor + ?Sized>(
     start: Option<Checkpoint>,
     monitor: &M,
 ) -> Result<Rendered, RenderError> {
+    // So that the kernels are compiled here, and once.
+    render_watched(stage, options, start, &Watched(monitor))
+}
+
+fn render_watched(
+    stage: &Stage,
+    options: &RenderOptions,
+    start: Option<Checkpoint>,
+    monitor: &dyn Monitor,
+) -> Result<Rendered, RenderError> {
     options.check()?;
     let RenderOptions { width, height, crop, ref aovs, .. } = *options;
     let mut film = Film::new(width, height, crop, aovs)
@@ -189,15 +200,17 @@ pub fn render_from<M: Monitor + ?Sized>(
     }
     rest.threshold = options.noise_threshold;
     let start = Instant::now();
-    let effects = stage.plan().simulated();
     // Chosen once: the rest is compiled for what the scene calls for.
     let job = Job::new(stage, options, &film);
-    let (done, end) = match (effects.contains(EffectSet::TEXTURES), stage.is_filtered()) {
-        (false, false) => job.run::<false, false, M>(&mut film, &mut tiles, &mut rest, monitor),
-        (false, true) => job.run::<false, true, M>(&mut film, &mut tiles, &mut rest, monitor),
-        (true, false) => job.run::<true, false, M>(&mut film, &mut tiles, &mut rest, monitor),
-        (true, true) => job.run::<true, true, M>(&mut film, &mut tiles, &mut rest, monitor),
+    let run = match stage.kernel() {
+        KernelChoice::Plain => Job::run::<Plain>,
+        KernelChoice::Textured => Job::run::<Textured>,
+        KernelChoice::Filtered => Job::run::<Filtered>,
+        KernelChoice::TexturedFiltered => Job::run::<TexturedFiltered>,
+        KernelChoice::Clear => Job::run::<Clear>,
+        KernelChoice::Full => Job::run::<Full>,
     };
+    let (done, end) = run(&job, &mut film, &mut tiles, &mut rest, monitor);
     let mut plan = stage.plan().clone();
     if !matches!(job.method, Method::Path(_)) {
         plan.leave(EffectSet::INDIRECT_LIGHT);
@@ -219,6 +232,27 @@ pub fn render_from<M: Monitor + ?Sized>(
     };
     let (interrupted, out_of_time) = (end == End::Cancelled, end == End::OutOfTime);
     Ok(Rendered { film, stats, effects, interrupted, out_of_time, rest })
+}
+
+/// A monitor of whatever kind.
+struct Watched<'a, M: ?Sized>(&'a M);
+
+impl<M: Monitor + ?Sized> Monitor for Watched<'_, M> {
+    fn progress(&self, done: u64, total: u64, rays: u64) {
+        self.0.progress(done, total, rays);
+    }
+
+    fn wants_checkpoint(&self) -> bool {
+        self.0.wants_checkpoint()
+    }
+
+    fn checkpoint(&self, sums: &Sums<'_>) {
+        self.0.checkpoint(sums);
+    }
+
+    fn cancelled(&self) -> bool {
+        self.0.cancelled()
+    }
 }
 
 /// Why a render ends.
@@ -321,12 +355,12 @@ impl<'a> Job<'a> {
     }
 
     /// Renders in passes until done, good enough, cancelled or out of time.
-    fn run<const TEXTURES: bool, const FILTERED: bool, M: Monitor + ?Sized>(
+    fn run<K: Kernel>(
         &self,
         film: &mut Film,
         tiles: &mut Tiles,
         rest: &mut Rest,
-        monitor: &M,
+        monitor: &dyn Monitor,
     ) -> (Done, End) {
         let window = film.window();
         let bands = u64::from(window.height.div_ceil(BAND));
@@ -345,7 +379,7 @@ impl<'a> Job<'a> {
                     .take(AT_ONCE)
                     .map(|mut band| {
                         let clock = Clock::default();
-                        let mut tracer = Tracer::<TEXTURES, FILTERED>::new(self.stage, &self.clip);
+                        let mut tracer = Tracer::<K>::new(self.stage, &self.clip);
                         let band_done = self.band(&mut tracer, &clock, &mut band, first..last, tiles, monitor);
                         let finished = finished.fetch_add(u64::from(last - first), Ordering::Relaxed);
                         let rays = rays.fetch_add(band_done.rays.total(), Ordering::Relaxed) + band_done.rays.total();
@@ -380,14 +414,14 @@ impl<'a> Job<'a> {
         first > self.options.first_sample && self.deadline.is_some_and(|end| Instant::now() >= end)
     }
 
-    fn band<'b, const TEXTURES: bool, const FILTERED: bool, M: Monitor + ?Sized>(
+    fn band<'b, K: Kernel>(
         &self,
-        tracer: &mut Tracer<'b, TEXTURES, FILTERED>,
+        tracer: &mut Tracer<'b, K>,
         clock: &'b Clock,
         band: &mut Band<'_>,
         samples: std::ops::Range<u32>,
         tiles: &Tiles,
-        monitor: &M,
+        monitor: &dyn Monitor,
     ) -> Done {
         let mut done = Done::default();
         for y in band.rows() {
@@ -422,9 +456,9 @@ impl<'a> Job<'a> {
     }
 
     /// Takes one sample; false if its numbers were no light.
-    fn sample<const TEXTURES: bool, const FILTERED: bool>(
+    fn sample<K: Kernel>(
         &self,
-        tracer: &mut Tracer<'_, TEXTURES, FILTERED>,
+        tracer: &mut Tracer<'_, K>,
         pixel: &mut [Accumulator],
         x: u32,
         y: u32,

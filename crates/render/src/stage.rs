@@ -8,6 +8,7 @@ use firsthit_import::scene::MaterialDesc;
 use glam::Vec3;
 
 use crate::camera::{Camera, CameraError};
+use crate::kernel::Full;
 use crate::light::Lights;
 use crate::light::area::{AreaLights, Glow, ShapeLight};
 use crate::light::choice::LightChoice;
@@ -17,7 +18,9 @@ use crate::material::{Conventions, Material, Textures};
 use crate::setting::{self, Setting};
 use crate::surface::World;
 use crate::texture::TextureError;
-use crate::{Background, CameraChoice, EffectPlan, EffectSet, StageOptions, TextureFilter, framing, survey};
+use crate::{
+    Background, CameraChoice, EffectPlan, EffectSet, KernelChoice, StageOptions, TextureFilter, framing, survey,
+};
 
 /// A scene that cannot be staged.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -73,6 +76,7 @@ pub struct Stage {
     pub(crate) reference: bool,
     /// Shadow rays of smooth meshes start on the curved surface that is meant.
     pub(crate) terminator: bool,
+    kernel: KernelChoice,
     plan: EffectPlan,
     explain: Vec<String>,
 }
@@ -86,6 +90,13 @@ pub(crate) struct Flags {
     pub(crate) alpha: bool,
     /// Shadow rays may pass.
     pub(crate) lets_through: bool,
+}
+
+impl Flags {
+    /// Whether any has to be asked.
+    fn asks(self) -> bool {
+        self.culls || self.alpha || self.lets_through
+    }
 }
 
 /// What the camera sees where there is nothing.
@@ -134,7 +145,8 @@ impl Stage {
 
         // What the scene calls for decides what is compiled.
         let mut plan = EffectPlan::default();
-        survey::call_for_materials(&mut plan, &scene);
+        let used = survey::used_materials(&scene);
+        survey::call_for_materials(&mut plan, &scene, &used);
         survey::call_for_lights(&mut plan, &scene, environment.as_ref(), &explain_environment(dim));
         let lit = setting::has_lights(&scene);
         let view = if reference { None } else { survey::view(&accel, &camera, options.aspect) };
@@ -174,7 +186,15 @@ impl Stage {
             alpha: m.has_alpha(),
             lets_through: m.lets_through(),
         });
-        let flags = flags.collect();
+        let flags: Vec<Flags> = flags.collect();
+        // What no surface has keeps no kernel from being small.
+        let of_used = |is: &dyn Fn(usize) -> bool| (0..used.len()).any(|i| used[i] && is(i));
+        let kernel = KernelChoice::new(
+            effects.contains(EffectSet::TEXTURES),
+            effects.intersects(EffectSet::ALPHA_MASK | EffectSet::ALPHA_BLEND) || of_used(&|i| flags[i].asks()),
+            effects.intersects(EffectSet::THROUGH) || of_used(&|i| materials[i].goes_through()),
+            effects.intersects(EffectSet::LAYERS) || of_used(&|i| materials[i].is_layered()),
+        );
         let world = World::new(scene);
 
         let mut punctual = Vec::new();
@@ -196,7 +216,7 @@ impl Stage {
                     let hit = firsthit_accel::Hit { id, t: 0.0, u, v, normal: glam::DVec3::Z };
                     let (material, at) = (of(id), world.attributes(&hit, true));
                     // How much is there of a mesh is looked up where it is asked.
-                    if world.is_shape(id) { material.glow::<true>(&at) } else { material.emission::<true>(&at) }
+                    if world.is_shape(id) { material.glow::<Full>(&at) } else { material.emission::<Full>(&at) }
                 },
             )
         } else {
@@ -219,8 +239,20 @@ impl Stage {
             ambient_reach: view.map_or(0.0, |v| 0.5 * v.distance),
         };
         let terminator = options.shadow_terminator && !reference;
-        let mut stage =
-            Self { world, accel, materials, flags, lights, camera, background, reference, terminator, plan, explain };
+        let mut stage = Self {
+            world,
+            accel,
+            materials,
+            flags,
+            lights,
+            camera,
+            background,
+            reference,
+            terminator,
+            kernel,
+            plan,
+            explain,
+        };
         if let Some(view) = view.filter(|_| dim) {
             stage.lights.ambient = survey::even_light(&stage, &view, options.aspect);
         }
@@ -251,10 +283,11 @@ impl Stage {
         &self.camera
     }
 
-    /// Whether any hit has to be asked about before it counts.
-    pub(crate) fn is_filtered(&self) -> bool {
-        self.plan.simulated().intersects(EffectSet::ALPHA_MASK | EffectSet::ALPHA_BLEND)
-            || self.flags.iter().any(|f| f.culls || f.alpha || f.lets_through)
+    /// The kernel that renders it: the smallest one that simulates all effects that are to be, and that can do with the
+    /// materials as they are compiled.
+    #[must_use]
+    pub fn kernel(&self) -> KernelChoice {
+        self.kernel
     }
 }
 

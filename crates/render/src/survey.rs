@@ -10,6 +10,7 @@ use crate::camera::Camera;
 use crate::camera::Cone;
 use crate::integrator::whitted::{Limits, Seen};
 use crate::integrator::{ROUGHEST_FOLLOWED, Tracer};
+use crate::kernel::Full;
 use crate::light::environment::luminance;
 use crate::light::punctual::PunctualLight;
 use crate::material::layers;
@@ -23,32 +24,34 @@ pub(crate) const AMBIENT: Vec3 = Vec3::splat(0.27);
 /// At most so many materials are named for each effect.
 const NAMED: usize = 6;
 
-/// The effects that the materials of visible geometry call for.
-pub(crate) fn call_for_materials(plan: &mut EffectPlan, scene: &SceneDesc) {
-    let mut used = vec![false; scene.materials.len()];
-    let mut default = false;
-    let mut colors = false;
-    for instance in &scene.instances {
-        for geometry in &scene.meshes[instance.mesh].geometries {
-            match geometry.material {
-                Some(m) => used[m] = true,
-                None => default = true,
-            }
-            colors |= matches!(&geometry.surface, SurfaceDesc::Triangles(mesh) if !mesh.colors.is_empty());
-        }
+/// Which materials visible geometry has: those of the scene, then the default material.
+pub(crate) fn used_materials(scene: &SceneDesc) -> Vec<bool> {
+    let mut used = vec![false; scene.materials.len() + 1];
+    for geometry in scene.instances.iter().flat_map(|i| &scene.meshes[i.mesh].geometries) {
+        used[geometry.material.unwrap_or(scene.materials.len())] = true;
     }
+    used
+}
+
+/// The effects that the materials of visible geometry call for.
+pub(crate) fn call_for_materials(plan: &mut EffectPlan, scene: &SceneDesc, used: &[bool]) {
+    let colors = scene
+        .instances
+        .iter()
+        .flat_map(|i| &scene.meshes[i.mesh].geometries)
+        .any(|g| matches!(&g.surface, SurfaceDesc::Triangles(mesh) if !mesh.colors.is_empty()));
     let mut calls: Vec<(EffectSet, String)> = scene
         .materials
         .iter()
         .zip(used)
         .enumerate()
-        .filter(|(_, (_, used))| *used)
+        .filter(|(_, (_, used))| **used)
         .map(|(i, (m, _))| {
             let name = if m.name.is_empty() { format!("material {i}") } else { format!("material '{}'", m.name) };
             (effects_of(&m.model), name)
         })
         .collect();
-    if default {
+    if used.last() == Some(&true) {
         calls.push((effects_of(&MaterialModel::Pbr(Box::default())), "the default material".into()));
     }
     if colors {
@@ -237,7 +240,7 @@ pub(crate) fn view(accel: &firsthit_accel::Scene, camera: &Camera, aspect: f64) 
 /// radiosity, Cohen et al. 1988, by a guess instead of a sum).
 pub(crate) fn even_light(stage: &Stage, view: &View, aspect: f64) -> Vec3 {
     let clip = ClipRegion::default();
-    let mut tracer = Tracer::<true, true>::new(stage, &clip);
+    let mut tracer = Tracer::<Full>::new(stage, &clip);
     let limits = Limits { bounces: 1, follow: LobeKind::empty() };
     let cone = Cone { width: 0.0, spread: 0.0 };
     let (mut sum, mut seen) = (0.0, 0);

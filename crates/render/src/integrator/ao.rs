@@ -6,6 +6,7 @@ use glam::Vec3;
 use super::whitted::Seen;
 use super::{Tracer, aov};
 use crate::RayKind;
+use crate::kernel::Kernel;
 use crate::sampler::{Dimension, PixelSampler};
 use crate::surface::Surface;
 use crate::warp;
@@ -13,7 +14,7 @@ use crate::warp;
 /// Keeps the numbers apart from those of the lobes.
 const BRANCH: u32 = 0x500_0000;
 
-impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> {
+impl<K: Kernel> Tracer<'_, K> {
     /// How much of the even light of rooms gets to a surface: one sample, where that is simulated, else all.
     pub(super) fn openness(&mut self, surface: &Surface<'_>, sampler: PixelSampler, bounce: u32) -> f32 {
         match self.occlusion_reach {
@@ -43,7 +44,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
         let point = stage.accel.surface_point(&ray, &hit);
         let surface = stage.world.surface(&hit, point, -ray.direction.as_vec3(), 0.0);
         let material = stage.world.material(hit.id);
-        let shading = stage.materials[material].shade::<TEXTURES>(&surface);
+        let shading = stage.materials[material].shade::<K>(&surface);
         let first = aov::First::new(&ray, &hit, &surface, &shading, material);
 
         let color = Vec3::splat(self.free(&surface, reach, sampler, 0));

@@ -7,6 +7,7 @@ use glam::{Vec2, Vec3};
 use super::Tracer;
 use super::whitted::Seen;
 use crate::camera::Cone;
+use crate::kernel::Kernel;
 use crate::material::Shading;
 use crate::surface::Surface;
 use crate::{Aov, RayKind};
@@ -27,7 +28,13 @@ pub(crate) struct First {
 }
 
 impl First {
-    pub(crate) fn new(ray: &Ray<f64>, hit: &Hit, surface: &Surface<'_>, shading: &Shading, material: usize) -> Self {
+    pub(crate) fn new<K: Kernel>(
+        ray: &Ray<f64>,
+        hit: &Hit,
+        surface: &Surface<'_>,
+        shading: &Shading<K>,
+        material: usize,
+    ) -> Self {
         Self {
             depth: (hit.t * ray.direction.length()) as f32,
             normal: shading.bsdf.normal,
@@ -73,7 +80,7 @@ impl First {
     }
 }
 
-impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> {
+impl<K: Kernel> Tracer<'_, K> {
     /// What a camera ray meets first, without any light.
     pub(crate) fn values(&mut self, ray: Ray<f64>, cone: Cone) -> Seen {
         let Some(hit) = self.closest(RayKind::Camera, &ray, None) else { return Seen::default() };
@@ -82,7 +89,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
         let width = (cone.width + cone.spread * hit.t) as f32;
         let surface = stage.world.surface(&hit, point, -ray.direction.as_vec3(), width);
         let material = stage.world.material(hit.id);
-        let shading = stage.materials[material].shade::<TEXTURES>(&surface);
+        let shading = stage.materials[material].shade::<K>(&surface);
         Seen { color: Vec3::ZERO, alpha: 1.0, first: Some(First::new(&ray, &hit, &surface, &shading, material)) }
     }
 }

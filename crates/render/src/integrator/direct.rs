@@ -6,10 +6,11 @@ use glam::{DVec3, Vec3};
 
 use super::Tracer;
 use crate::RayKind;
+use crate::kernel::{Kernel, MAX_LOBES};
 use crate::light::environment::luminance;
 use crate::light::{LightEnd, LightSample, power_heuristic};
+use crate::material::Bsdf;
 use crate::material::lobes::{Lobe, LobeKind};
-use crate::material::{Bsdf, MAX_LOBES};
 use crate::sampler::{Dimension, PixelSampler};
 use crate::surface::Surface;
 use crate::warp;
@@ -22,9 +23,9 @@ const ENVIRONMENT: u32 = 0x400_0000;
 
 /// A point that is lit.
 #[derive(Clone, Copy)]
-pub(super) struct Lit<'a> {
+pub(super) struct Lit<'a, K: Kernel> {
     pub(super) surface: &'a Surface<'a>,
-    pub(super) bsdf: &'a Bsdf,
+    pub(super) bsdf: &'a Bsdf<K>,
     /// Which lobes are also followed by rays, which may find the same lights: they share by weights.
     pub(super) followed: [bool; MAX_LOBES],
     pub(super) sampler: PixelSampler,
@@ -33,7 +34,7 @@ pub(super) struct Lit<'a> {
     pub(super) enters: bool,
 }
 
-impl Lit<'_> {
+impl<K: Kernel> Lit<'_, K> {
     /// f |cos| towards a light, each lobe weighted against what following it would find.
     fn scattered(&self, sample: &LightSample) -> Vec3 {
         let (wo, wi) = (self.bsdf.local(self.surface.wo), self.bsdf.local(sample.direction));
@@ -46,10 +47,10 @@ impl Lit<'_> {
                 continue;
             }
             let weight = match sample.pdf {
-                Some(pdf) if followed => power_heuristic(pdf, lobe.pdf(wo, wi)),
+                Some(pdf) if followed => power_heuristic(pdf, lobe.pdf::<K>(wo, wi)),
                 _ => 1.0,
             };
-            total += lobe.eval(wo, wi) * weight;
+            total += lobe.eval::<K>(wo, wi) * weight;
         }
         total
     }
@@ -75,9 +76,9 @@ impl Lit<'_> {
     }
 }
 
-impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> {
+impl<K: Kernel> Tracer<'_, K> {
     /// Radiance to the viewer by one reflection of what all lights send.
-    pub(super) fn direct(&mut self, lit: &Lit<'_>) -> Vec3 {
+    pub(super) fn direct(&mut self, lit: &Lit<'_, K>) -> Vec3 {
         let stage = self.stage;
         let position = lit.surface.point.position;
         let numbers = |branch: u32| {
@@ -101,7 +102,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
             let (choice, u) = numbers(MESH);
             if let Some((mut sample, hit)) = light.sample(position, choice, u, lit.surface.id) {
                 let glow = stage.world.attributes(&hit, true);
-                sample.radiance *= stage.materials[stage.world.material(hit.id)].glow::<TEXTURES>(&glow);
+                sample.radiance *= stage.materials[stage.world.material(hit.id)].glow::<K>(&glow);
                 total += self.arriving(lit, &sample, RayKind::ShadowArea);
             }
         }
@@ -109,7 +110,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
         total
     }
 
-    fn arriving(&mut self, lit: &Lit<'_>, sample: &LightSample, kind: RayKind) -> Vec3 {
+    fn arriving(&mut self, lit: &Lit<'_, K>, sample: &LightSample, kind: RayKind) -> Vec3 {
         let light = lit.scattered(sample) * sample.radiance;
         if !(light.max_element() > 0.0) {
             return Vec3::ZERO;
@@ -122,7 +123,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
     /// by several candidates, of which one is chosen in proportion to the light that it would send if nothing were in
     /// the way: Talbot, Cline and Egbert, "Importance Resampling for Global Illumination" (2005). So no shadow ray is
     /// lost on what lies below the horizon or reflects little.
-    fn surroundings(&mut self, lit: &Lit<'_>) -> Vec3 {
+    fn surroundings(&mut self, lit: &Lit<'_, K>) -> Vec3 {
         /// Half of them drawn from the map, half by the cosine.
         const CANDIDATES: u32 = 4;
         let stage = self.stage;

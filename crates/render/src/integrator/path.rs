@@ -19,6 +19,7 @@ use super::whitted::{Limits, Seen};
 use super::{Tracer, aov};
 use crate::RayKind;
 use crate::camera::Cone;
+use crate::kernel::Kernel;
 use crate::light::choice::{Chosen, Shares};
 use crate::light::tree::Receiver;
 use crate::light::{LightEnd, LightSample, power_heuristic, studio};
@@ -67,9 +68,9 @@ struct Asked {
 }
 
 /// A surface that a path meets.
-struct Vertex<'a, 'b> {
+struct Vertex<'a, 'b, K: Kernel> {
     surface: &'a Surface<'b>,
-    scatter: &'a Scatter<'a>,
+    scatter: &'a Scatter<'a, K>,
     receiver: Receiver,
     shares: Shares,
     sampler: PixelSampler,
@@ -79,7 +80,7 @@ struct Vertex<'a, 'b> {
     enters: bool,
 }
 
-impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> {
+impl<K: Kernel> Tracer<'_, K> {
     /// What the camera sees along a ray by one path; `screen` is where in the picture that is, 0 to 1 from the upper
     /// left.
     pub(crate) fn path(
@@ -114,7 +115,9 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
                 self.escape_by_path(&walk, screen, limits, &mut seen);
                 return seen;
             };
-            walk.throughput *= walk.left_after(hit.t);
+            if K::THROUGH {
+                walk.throughput *= walk.left_after(hit.t);
+            }
             if !self.scatter(&mut walk, &hit, sampler, limits, &mut seen) {
                 return seen;
             }
@@ -182,15 +185,15 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
         let index = stage.world.material(hit.id);
         let material = &stage.materials[index];
 
-        if FILTERED && material.has_alpha() && walk.layers < MOST_LAYERS {
-            let covered = material.coverage::<TEXTURES>(&surface);
+        if K::FILTERED && material.has_alpha() && walk.layers < MOST_LAYERS {
+            let covered = material.coverage::<K>(&surface);
             let layer = sampler.branch(walk.layers);
             if covered < 1.0 && self.draw1(&layer, Dimension::Alpha(walk.bounce)) >= covered {
                 walk.pass(&surface, RayKind::Transparency);
                 return true;
             }
         }
-        let shading = material.shade::<TEXTURES>(&surface);
+        let shading = material.shade::<K>(&surface);
         if seen.first.is_none() && walk.straight {
             seen.first = Some(aov::First::new(&walk.ray, hit, &surface, &shading, index));
         }
@@ -200,7 +203,8 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
         }
         let lobes = shading.bsdf.lobes();
         // Clear sheets are passed at the last surface too: light that is asked there comes through them.
-        let (ends, sheet) = (walk.bounce >= limits.bounces, material.is_clear() && !material.solid);
+        let solid = K::THROUGH && material.solid;
+        let (ends, sheet) = (walk.bounce >= limits.bounces, K::THROUGH && material.is_clear() && !solid);
         if lobes.is_empty() || (ends && !sheet) {
             return false;
         }
@@ -208,7 +212,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
         let sampler = if walk.layers == 0 { sampler } else { sampler.branch(walk.layers) };
         let mut asked = None;
         if scatter.spreads && !ends {
-            let receiver = receiver(&surface, shading.bsdf.normal, lobes);
+            let receiver = receiver::<K>(&surface, shading.bsdf.normal, lobes);
             let shares = stage.lights.choice.shares(&stage.lights.punctual, &receiver);
             let vertex = Vertex {
                 surface: &surface,
@@ -218,7 +222,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
                 sampler,
                 bounce: walk.bounce,
                 absorption: walk.absorption,
-                enters: material.solid && surface.front,
+                enters: solid && surface.front,
             };
             seen.color += walk.throughput * self.ask(&vertex, &shading.bsdf, limits);
             asked = Some((receiver, shares));
@@ -227,7 +231,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
         let direction = self.draw2(&sampler, Dimension::Direction(walk.bounce));
         let Some(on) = scatter.sample(choice, direction) else { return false };
         let direction = shading.bsdf.world(on.wi).as_dvec3().normalize();
-        let through = on.wi.z < 0.0;
+        let through = K::THROUGH && on.wi.z < 0.0;
         // A shading normal may send a reflection below the surface, or a refraction above it.
         let side = direction.dot(surface.geometric.as_dvec3());
         if !(if through { side < 0.0 } else { side > 0.0 }) {
@@ -238,8 +242,8 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
             return false;
         }
         let lobe = &lobes[on.lobe];
-        let unbent = matches!(lobe, Lobe::SpecularTransmission(s) if s.eta == 1.0);
-        if unbent && !material.solid && walk.layers < MOST_LAYERS {
+        let unbent = K::THROUGH && matches!(lobe, Lobe::SpecularTransmission(s) if s.eta == 1.0);
+        if unbent && !solid && walk.layers < MOST_LAYERS {
             // A clear sheet: the light that was asked before was asked through it, where that is simulated.
             if !material.is_clear() {
                 walk.scattered = None;
@@ -253,7 +257,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
         if through && material.parts_colors {
             walk.colors = walk.colors.parted();
         }
-        let entered = through && material.solid;
+        let entered = through && solid;
         if entered {
             walk.absorption = if surface.front { material.absorption } else { Vec3::ZERO };
         }
@@ -302,7 +306,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
     }
 
     /// Radiance to the viewer by one reflection of the light of one light, over the probability of asking it.
-    fn ask(&mut self, at: &Vertex<'_, '_>, bsdf: &Bsdf, limits: Limits) -> Vec3 {
+    fn ask(&mut self, at: &Vertex<'_, '_, K>, bsdf: &Bsdf<K>, limits: Limits) -> Vec3 {
         let stage = self.stage;
         let lights = &stage.lights;
         let choice = &lights.choice;
@@ -338,7 +342,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
                     .and_then(|mesh| mesh.sample_triangle(i, 1.0 / f64::from(probability), from, u, at.surface.id));
                 let sample = sample.map(|(mut sample, hit)| {
                     let glow = stage.world.attributes(&hit, true);
-                    sample.radiance *= stage.materials[stage.world.material(hit.id)].glow::<TEXTURES>(&glow);
+                    sample.radiance *= stage.materials[stage.world.material(hit.id)].glow::<K>(&glow);
                     sample
                 });
                 (sample, RayKind::ShadowArea)
@@ -355,14 +359,14 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
     }
 
     /// Radiance to the viewer by one reflection of a light sample's light, shared with what following would find.
-    fn arrives_at(&mut self, at: &Vertex<'_, '_>, bsdf: &Bsdf, sample: &LightSample, kind: RayKind) -> Vec3 {
+    fn arrives_at(&mut self, at: &Vertex<'_, '_, K>, bsdf: &Bsdf<K>, sample: &LightSample, kind: RayKind) -> Vec3 {
         let surface = at.surface;
         let wi = bsdf.local(sample.direction);
         let side = sample.direction.dot(surface.geometric);
         let terminator = self.stage.terminator;
         // Light from just below the flat triangle still reaches the curved surface that the normals mean.
         let before = wi.z > 0.0 && sample.direction.dot(surface.smooth) > 0.0;
-        let behind = wi.z < 0.0 && side < 0.0 && !at.enters;
+        let behind = K::THROUGH && wi.z < 0.0 && side < 0.0 && !at.enters;
         if !(before || behind) {
             return Vec3::ZERO;
         }
@@ -410,10 +414,10 @@ fn from_around(s: crate::light::environment::EnvironmentSample, probability: f32
 
 /// The surface as lights see it.
 #[inline]
-fn receiver(surface: &Surface<'_>, normal: Vec3, lobes: &[Lobe]) -> Receiver {
+fn receiver<K: Kernel>(surface: &Surface<'_>, normal: Vec3, lobes: &[Lobe]) -> Receiver {
     // Where light may come from behind, or the normals disagree, every direction may matter.
     let flat = normal == surface.geometric;
-    let opaque = lobes.iter().all(|l| is_delta(l) || !l.goes_through());
+    let opaque = !K::THROUGH || lobes.iter().all(|l| is_delta(l) || !l.goes_through());
     let least_cos = if !opaque {
         0.3
     } else if flat {
@@ -458,7 +462,7 @@ impl Walk {
 /// What is asked of a material by rays that pass it without bending.
 impl Material {
     /// What light keeps that passes a smooth boundary straight on, where it is there; 0 of rough ones, which scatter.
-    pub(super) fn passes_smoothly<const TEXTURES: bool>(&self, surface: &Surface<'_>, cos: f32) -> Vec3 {
-        if self.is_smooth::<TEXTURES>(surface) { self.straight_through::<TEXTURES>(surface, cos) } else { Vec3::ZERO }
+    pub(super) fn passes_smoothly<K: Kernel>(&self, surface: &Surface<'_>, cos: f32) -> Vec3 {
+        if self.is_smooth::<K>(surface) { self.straight_through::<K>(surface, cos) } else { Vec3::ZERO }
     }
 }

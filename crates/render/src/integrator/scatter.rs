@@ -2,8 +2,9 @@
 
 use glam::Vec3;
 
+use crate::kernel::{Kernel, MAX_LOBES};
+use crate::material::Bsdf;
 use crate::material::lobes::{Lobe, LobeKind};
-use crate::material::{Bsdf, MAX_LOBES};
 
 /// A way on from a surface.
 #[derive(Clone, Copy, Debug)]
@@ -30,8 +31,8 @@ pub(super) struct Towards {
 }
 
 /// How a surface scatters towards one viewer.
-pub(super) struct Scatter<'a> {
-    bsdf: &'a Bsdf,
+pub(super) struct Scatter<'a, K: Kernel> {
+    bsdf: &'a Bsdf<K>,
     wo: Vec3,
     /// How often each lobe is followed.
     chances: [f32; MAX_LOBES],
@@ -60,10 +61,10 @@ fn is_even(alpha: f32, reflectance: impl FnOnce() -> Vec3) -> bool {
     alpha > super::ROUGHEST_FOLLOWED && reflectance().max_element() < 0.2
 }
 
-impl<'a> Scatter<'a> {
+impl<'a, K: Kernel> Scatter<'a, K> {
     /// `throughput` is that of the path up to here: lobes are chosen by what they add to it.
     #[inline]
-    pub(super) fn new(bsdf: &'a Bsdf, viewer: Vec3, throughput: Vec3, follow: LobeKind) -> Self {
+    pub(super) fn new(bsdf: &'a Bsdf<K>, viewer: Vec3, throughput: Vec3, follow: LobeKind) -> Self {
         let wo = bsdf.local(viewer);
         let mut chances = [0.0; MAX_LOBES];
         if let [lobe] = bsdf.lobes() {
@@ -74,7 +75,7 @@ impl<'a> Scatter<'a> {
         for (chance, lobe) in chances.iter_mut().zip(bsdf.lobes()) {
             spreads |= !is_delta(lobe);
             if follow.contains(family(lobe)) {
-                *chance = (throughput * lobe.albedo(wo)).max_element().max(0.0);
+                *chance = (throughput * lobe.albedo::<K>(wo)).max_element().max(0.0);
                 sum += *chance;
             }
         }
@@ -90,10 +91,10 @@ impl<'a> Scatter<'a> {
     pub(super) fn towards(&self, wi: Vec3) -> Towards {
         let mut towards = Towards { followed: Vec3::ZERO, others: Vec3::ZERO, pdf: 0.0 };
         for (lobe, chance) in self.bsdf.lobes().iter().zip(self.chances) {
-            let f = lobe.eval(self.wo, wi);
+            let f = lobe.eval::<K>(self.wo, wi);
             if chance > 0.0 {
                 towards.followed += f;
-                towards.pdf += chance * lobe.pdf(self.wo, wi);
+                towards.pdf += chance * lobe.pdf::<K>(self.wo, wi);
             } else {
                 towards.others += f;
             }
@@ -117,7 +118,7 @@ impl<'a> Scatter<'a> {
             }
         }
         let (lobe, chance) = (lobes.get(index)?, self.chances[index]);
-        let sample = lobe.sample(self.wo, u)?;
+        let sample = lobe.sample::<K>(self.wo, u)?;
         let Some(own) = sample.pdf else {
             return Some(Scattered { wi: sample.wi, weight: sample.weight / chance, pdf: None, lobe: index });
         };
@@ -128,8 +129,8 @@ impl<'a> Scatter<'a> {
         let (mut f, mut pdf) = (sample.weight * own, chance * own);
         for (i, (other, chance)) in lobes.iter().zip(self.chances).enumerate() {
             if i != index && chance > 0.0 {
-                f += other.eval(self.wo, sample.wi);
-                pdf += chance * other.pdf(self.wo, sample.wi);
+                f += other.eval::<K>(self.wo, sample.wi);
+                pdf += chance * other.pdf::<K>(self.wo, sample.wi);
             }
         }
         let weight = f / pdf;

@@ -1,5 +1,6 @@
 //! Casting rays into a stage.
 
+use std::marker::PhantomData;
 use std::time::{Duration, Instant};
 
 use firsthit_accel::{Hit, HitId};
@@ -8,6 +9,7 @@ use firsthit_geometry::clip::ClipRegion;
 use glam::{DVec3, Vec3};
 
 use super::clock::{Clock, Parts, Spent};
+use crate::kernel::Kernel;
 use crate::light::{LightEnd, LightSample};
 use crate::material::Colors;
 use crate::sampler::{Dimension, PixelSampler};
@@ -67,11 +69,8 @@ enum Clear {
     SmoothSheets,
 }
 
-/// Casts rays for one thread, and counts them.
-///
-/// `TEXTURES`: materials may have textures. `FILTERED`: some hits have to be asked about before they count (alpha,
-/// culled back faces, clear surfaces in the way of light).
-pub(crate) struct Tracer<'a, const TEXTURES: bool, const FILTERED: bool> {
+/// Casts rays for one thread by one kernel, and counts them.
+pub(crate) struct Tracer<'a, K: Kernel> {
     pub(crate) stage: &'a Stage,
     clip: Option<&'a ClipRegion<f64>>,
     shadows: bool,
@@ -84,9 +83,10 @@ pub(crate) struct Tracer<'a, const TEXTURES: bool, const FILTERED: bool> {
     pub(crate) timed: bool,
     /// Times what is not rays on such pixels, if that is asked for.
     pub(crate) clock: Option<&'a Clock>,
+    kernel: PhantomData<K>,
 }
 
-impl<'a, const TEXTURES: bool, const FILTERED: bool> Tracer<'a, TEXTURES, FILTERED> {
+impl<'a, K: Kernel> Tracer<'a, K> {
     pub(crate) fn new(stage: &'a Stage, clip: &'a ClipRegion<f64>) -> Self {
         Self {
             stage,
@@ -102,6 +102,7 @@ impl<'a, const TEXTURES: bool, const FILTERED: bool> Tracer<'a, TEXTURES, FILTER
             timing: Timing::default(),
             timed: false,
             clock: None,
+            kernel: PhantomData,
         }
     }
 
@@ -151,7 +152,7 @@ impl<'a, const TEXTURES: bool, const FILTERED: bool> Tracer<'a, TEXTURES, FILTER
     pub(crate) fn closest(&mut self, kind: RayKind, ray: &Ray<f64>, source: Option<HitId>) -> Option<Hit> {
         self.timed(kind, |this| {
             let ray = this.clipped(ray)?;
-            if FILTERED {
+            if K::FILTERED {
                 this.stage.accel.closest_hit_filtered(&ray, source, |hit| this.is_seen(&ray, hit))
             } else {
                 // A spawned ray starts off its surface for certain: nothing has to be left out.
@@ -168,7 +169,7 @@ impl<'a, const TEXTURES: bool, const FILTERED: bool> Tracer<'a, TEXTURES, FILTER
             return false;
         }
         !self.stage.flags[material].alpha
-            || self.stage.materials[material].coverage::<TEXTURES>(&world.attributes(hit, true)) > 0.0
+            || self.stage.materials[material].coverage::<K>(&world.attributes(hit, true)) > 0.0
     }
 
     /// Whether a surface is not there for what meets its back: sight, or the light on its way. A shadow ray runs
@@ -183,13 +184,13 @@ impl<'a, const TEXTURES: bool, const FILTERED: bool> Tracer<'a, TEXTURES, FILTER
         self.timed(kind, |this| {
             let Some(ray) = this.clipped(ray) else { return false };
             this.stage.accel.any_hit_filtered(&ray, Some(source), |hit| {
-                if !FILTERED {
+                if !K::FILTERED {
                     return true;
                 }
                 let material = this.stage.world.material(hit.id);
                 !this.is_culled(hit, material, -ray.direction)
                     && (!this.stage.flags[material].alpha
-                        || this.stage.materials[material].coverage::<TEXTURES>(&this.stage.world.attributes(hit, true))
+                        || this.stage.materials[material].coverage::<K>(&this.stage.world.attributes(hit, true))
                             > covers)
             })
         })
@@ -204,7 +205,7 @@ impl<'a, const TEXTURES: bool, const FILTERED: bool> Tracer<'a, TEXTURES, FILTER
         let ray = towards(from, sample);
         self.timed(kind, |this| {
             let Some(ray) = this.clipped(&ray) else { return Vec3::ONE };
-            if FILTERED {
+            if K::FILTERED {
                 return this.filtered_transmittance(&ray, sample.target, source, Clear::All);
             }
             let target = sample.target;
@@ -228,7 +229,7 @@ impl<'a, const TEXTURES: bool, const FILTERED: bool> Tracer<'a, TEXTURES, FILTER
                 return Vec3::ZERO;
             }
             let Some(ray) = this.clipped(&ray) else { return Vec3::ONE };
-            if FILTERED {
+            if K::FILTERED {
                 let clear = if sample.pdf.is_none() { Clear::Smooth } else { Clear::SmoothSheets };
                 return this.filtered_transmittance(&ray, sample.target, source, clear);
             }
@@ -258,17 +259,17 @@ impl<'a, const TEXTURES: bool, const FILTERED: bool> Tracer<'a, TEXTURES, FILTER
             }
             let material = &stage.materials[index];
             let surface = world.attributes(hit, true);
-            let covered = material.coverage::<TEXTURES>(&surface);
+            let covered = material.coverage::<K>(&surface);
             if covered <= 0.0 {
                 return false;
             }
             let mut through = Vec3::ZERO;
-            if material.is_clear() && (clear != Clear::SmoothSheets || !material.solid) {
+            if K::THROUGH && material.is_clear() && (clear != Clear::SmoothSheets || !material.solid) {
                 let crossing = world.crossing(hit, ray);
                 let cos = crossing.normal.dot(direction).abs() as f32;
                 through = match clear {
-                    Clear::All => material.straight_through::<TEXTURES>(&surface, cos),
-                    _ => material.passes_smoothly::<TEXTURES>(&surface, cos),
+                    Clear::All => material.straight_through::<K>(&surface, cos),
+                    _ => material.passes_smoothly::<K>(&surface, cos),
                 };
                 if material.solid {
                     let way = |t: f64| (t * length) as f32;

@@ -16,10 +16,11 @@ use super::direct::{Lit, is_followed};
 use super::{Tracer, aov};
 use crate::RayKind;
 use crate::camera::Cone;
+use crate::kernel::{Kernel, MAX_LOBES};
 use crate::light::power_heuristic;
 use crate::light::studio;
 use crate::material::lobes::{Lobe, LobeKind, LobeSample};
-use crate::material::{Colors, MAX_LOBES, Material, Shading};
+use crate::material::{Colors, Material, Shading};
 use crate::sampler::{Dimension, PixelSampler};
 use crate::stage::Backdrop;
 use crate::surface::Surface;
@@ -84,7 +85,7 @@ pub(crate) struct Limits {
     pub(crate) follow: LobeKind,
 }
 
-impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> {
+impl<K: Kernel> Tracer<'_, K> {
     /// What the camera sees along a ray; `screen` is where in the picture that is, 0 to 1 from the upper left.
     pub(crate) fn radiance(
         &mut self,
@@ -163,13 +164,13 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
         surface.colors = path.colors;
         let material = &stage.materials[stage.world.material(hit.id)];
 
-        if FILTERED && material.has_alpha() {
-            let covered = material.coverage::<TEXTURES>(&surface);
+        if K::FILTERED && material.has_alpha() {
+            let covered = material.coverage::<K>(&surface);
             if covered < 1.0 && !self.pass(&mut path, &surface, covered, pending) {
                 return;
             }
         }
-        let shading = material.shade::<TEXTURES>(&surface);
+        let shading = material.shade::<K>(&surface);
         if seen.first.is_none() && path.kind == RayKind::Camera {
             seen.first = Some(aov::First::new(&path.ray, hit, &surface, &shading, stage.world.material(hit.id)));
         }
@@ -239,14 +240,14 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
         path: &Pending,
         surface: &Surface<'_>,
         material: &Material,
-        shading: &Shading,
+        shading: &Shading<K>,
         followed: [bool; MAX_LOBES],
         t: f64,
         pending: &mut Vec<Pending>,
     ) {
         let bsdf = &shading.bsdf;
         let wo = bsdf.local(surface.wo);
-        let strength = |lobe: &Lobe| (path.throughput * lobe.albedo(wo)).max_element();
+        let strength = |lobe: &Lobe| (path.throughput * lobe.albedo::<K>(wo)).max_element();
         let lobes = || bsdf.lobes().iter().enumerate().filter(|(i, _)| followed[*i]);
         if path.bounce < SPLITS {
             // The last one pushed is traced first: reflections before refractions, as they are listed.
@@ -259,7 +260,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
                     continue;
                 }
                 let u = sampler.get2(Dimension::Direction(path.bounce));
-                if let Some(sample) = lobe.sample(wo, u) {
+                if let Some(sample) = lobe.sample::<K>(wo, u) {
                     let share = 1.0 / chance;
                     self.go_on(path, surface, material, shading, lobe, sample, share, sampler, t, pending);
                 }
@@ -290,7 +291,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
             return;
         };
         share *= total / strength(lobe);
-        if let Some(sample) = lobe.sample(wo, path.sampler.get2(Dimension::Direction(path.bounce))) {
+        if let Some(sample) = lobe.sample::<K>(wo, path.sampler.get2(Dimension::Direction(path.bounce))) {
             self.go_on(path, surface, material, shading, lobe, sample, share, path.sampler, t, pending);
         }
     }
@@ -301,7 +302,7 @@ impl<const TEXTURES: bool, const FILTERED: bool> Tracer<'_, TEXTURES, FILTERED> 
         path: &Pending,
         surface: &Surface<'_>,
         material: &Material,
-        shading: &Shading,
+        shading: &Shading<K>,
         lobe: &Lobe,
         sample: LobeSample,
         share: f32,

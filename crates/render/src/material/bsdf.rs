@@ -3,27 +3,25 @@
 use glam::Vec3;
 
 use super::lobes::Lobe;
+use crate::kernel::Kernel;
 use crate::warp;
-
-/// The most lobes that a surface has: diffuse, reflection, transmission, diffuse transmission, sheen, coat.
-pub(crate) const MAX_LOBES: usize = 6;
 
 /// The sum of a few lobes around a shading normal.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Bsdf {
+pub(crate) struct Bsdf<K: Kernel> {
     x: Vec3,
     y: Vec3,
     /// The shading normal, unit, on the viewer's side.
     pub(crate) normal: Vec3,
-    lobes: [Lobe; MAX_LOBES],
+    lobes: K::Lobes,
     count: usize,
 }
 
-impl Bsdf {
+impl<K: Kernel> Bsdf<K> {
     /// Black.
     pub(crate) fn new(normal: Vec3) -> Self {
         let (x, y) = warp::frame(normal);
-        Self { x, y, normal, lobes: [Lobe::Nothing; MAX_LOBES], count: 0 }
+        Self { x, y, normal, lobes: K::NO_LOBES, count: 0 }
     }
 
     /// Black, with an x axis along the surface that lies as near to `tangent` as the normal lets it.
@@ -34,16 +32,16 @@ impl Bsdf {
         }
     }
 
-    /// Adds a lobe: at most [`MAX_LOBES`].
+    /// Adds a lobe: at most as many as the kernel has room for.
     #[inline]
     pub(crate) fn with(mut self, lobe: Lobe) -> Self {
-        self.lobes[self.count] = lobe;
+        self.lobes.as_mut()[self.count] = lobe;
         self.count += 1;
         self
     }
 
     pub(crate) fn lobes(&self) -> &[Lobe] {
-        &self.lobes[..self.count]
+        &self.lobes.as_ref()[..self.count]
     }
 
     /// A world direction in the frame of the lobes.

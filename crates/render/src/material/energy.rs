@@ -9,6 +9,7 @@ use glam::Vec3;
 use super::fresnel::{Fresnel, normal_incidence};
 use super::lobes::{GgxReflection, GgxTransmission, Lobe, Sheen};
 use super::microfacet::{Masking, g1, g2, sample_visible};
+use crate::kernel::Full;
 
 /// Points along each side of the tables that all materials share.
 const FINE: usize = 32;
@@ -79,7 +80,7 @@ fn integrate_sheen(cos: f32, roughness: f32) -> f32 {
         for j in 0..M {
             let phi = (j as f32 + 0.5) / M as f32 * PI;
             let wi = Vec3::new(r * phi.cos(), r * phi.sin(), z);
-            sum += lobe.eval(wo, wi).x * 2.0 * t;
+            sum += lobe.eval::<Full>(wo, wi).x * 2.0 * t;
         }
     }
     sum * 2.0 * PI / (N * M) as f32
@@ -97,7 +98,7 @@ fn integrate_boundary<const N: u32, const M: u32>(cos: f32, alpha: f32, eta: f32
         let (phi, t) = (((i % M) as f32 + 0.5) / (2 * M) as f32, ((i / M) as f32 + 0.5) / N as f32);
         let u = [phi, 1.0 - (1.0 - t) * (1.0 - t)];
         for lobe in &lobes {
-            sum += 2.0 * (1.0 - t) * lobe.sample(wo, u).map_or(0.0, |s| s.weight.x);
+            sum += 2.0 * (1.0 - t) * lobe.sample::<Full>(wo, u).map_or(0.0, |s| s.weight.x);
         }
     }
     sum / (N * M) as f32

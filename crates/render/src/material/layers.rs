@@ -8,6 +8,7 @@ use super::lobes::{Clearcoat, DiffuseTransmission, Lobe, Sheen};
 use super::pbr::{color, scalar};
 use super::thin_film::Film;
 use super::{Conventions, LEAST_ALPHA, Textures, energy};
+use crate::kernel::Kernel;
 use crate::surface::Surface;
 use crate::texture::{ColorSpace, TextureLookup};
 use crate::{EffectSet, StageError};
@@ -140,30 +141,30 @@ impl Layers {
         self.through.is_some()
     }
 
-    fn coat_weight<const TEXTURES: bool>(&self, surface: &Surface<'_>) -> Option<(&Coat, f32)> {
+    fn coat_weight<K: Kernel>(&self, surface: &Surface<'_>) -> Option<(&Coat, f32)> {
         let coat = self.coat.as_ref()?;
-        let weight = (coat.factor * scalar::<TEXTURES>(coat.texture.as_ref(), surface)).clamp(0.0, 1.0);
+        let weight = (coat.factor * scalar::<K>(coat.texture.as_ref(), surface)).clamp(0.0, 1.0);
         (weight > 0.0).then_some((coat, weight))
     }
 
     /// What coat and sheen leave of light that passes straight through at this cosine: normal maps do not count.
-    pub(super) fn passed<const TEXTURES: bool>(&self, surface: &Surface<'_>, cos: f32) -> f32 {
-        let coat = self.coat_weight::<TEXTURES>(surface).map_or(1.0, |(_, weight)| Clearcoat::passed(weight, cos));
-        let sheen = self.sheen::<TEXTURES>(surface, cos).map_or(1.0, |(_, passed)| passed);
+    pub(super) fn passed<K: Kernel>(&self, surface: &Surface<'_>, cos: f32) -> f32 {
+        let coat = self.coat_weight::<K>(surface).map_or(1.0, |(_, weight)| Clearcoat::passed(weight, cos));
+        let sheen = self.sheen::<K>(surface, cos).map_or(1.0, |(_, passed)| passed);
         coat * sheen
     }
 
     /// The coat as a lobe about the base's normal, and what it leaves of the light below.
-    pub(super) fn coat<const TEXTURES: bool>(
+    pub(super) fn coat<K: Kernel>(
         &self,
         surface: &Surface<'_>,
         bend: bool,
         local: impl Fn(Vec3) -> Vec3,
     ) -> Option<(Lobe, f32)> {
-        let (coat, weight) = self.coat_weight::<TEXTURES>(surface)?;
-        let roughness = (coat.roughness * scalar::<TEXTURES>(coat.roughness_texture.as_ref(), surface)).clamp(0.0, 1.0);
+        let (coat, weight) = self.coat_weight::<K>(surface)?;
+        let roughness = (coat.roughness * scalar::<K>(coat.roughness_texture.as_ref(), surface)).clamp(0.0, 1.0);
         let mut normal =
-            mapped::<TEXTURES>(surface, coat.normal_texture.as_ref(), coat.normal_scale).unwrap_or(surface.smooth);
+            mapped::<K>(surface, coat.normal_texture.as_ref(), coat.normal_scale).unwrap_or(surface.smooth);
         if bend {
             normal = surface.bent(normal);
         }
@@ -173,26 +174,26 @@ impl Layers {
     }
 
     /// The sheen as a lobe, and what it leaves of the light below, at this cosine to the viewer.
-    pub(super) fn sheen<const TEXTURES: bool>(&self, surface: &Surface<'_>, cos: f32) -> Option<(Sheen, f32)> {
+    pub(super) fn sheen<K: Kernel>(&self, surface: &Surface<'_>, cos: f32) -> Option<(Sheen, f32)> {
         let sheen = self.sheen.as_ref()?;
-        let tint = sheen.color * color::<TEXTURES>(sheen.color_texture.as_ref(), surface).xyz();
+        let tint = sheen.color * color::<K>(sheen.color_texture.as_ref(), surface).xyz();
         if tint.max_element() <= 0.0 {
             return None;
         }
-        let roughness = sheen.roughness * scalar::<TEXTURES>(sheen.roughness_texture.as_ref(), surface);
+        let roughness = sheen.roughness * scalar::<K>(sheen.roughness_texture.as_ref(), surface);
         // Albedo scaling as the extension has it, by the viewer's angle alone.
         let passed = 1.0 - tint.max_element() * energy::sheen(cos, roughness);
         Some((Sheen::new(tint, roughness), passed.max(0.0)))
     }
 
     /// The base's law of reflectance under the film.
-    pub(super) fn filmed<const TEXTURES: bool>(&self, surface: &Surface<'_>, base: Fresnel) -> Fresnel {
+    pub(super) fn filmed<K: Kernel>(&self, surface: &Surface<'_>, base: Fresnel) -> Fresnel {
         let (Some(film), Fresnel::Schlick { f0, f90, eta }) = (&self.film, base) else { return base };
-        let factor = (film.factor * scalar::<TEXTURES>(film.texture.as_ref(), surface)).clamp(0.0, 1.0);
+        let factor = (film.factor * scalar::<K>(film.texture.as_ref(), surface)).clamp(0.0, 1.0);
         if factor == 0.0 {
             return base;
         }
-        let share = scalar::<TEXTURES>(film.thickness_texture.as_ref(), surface);
+        let share = scalar::<K>(film.thickness_texture.as_ref(), surface);
         let thickness = film.thickness[0] + (film.thickness[1] - film.thickness[0]) * share;
         // Below a coat, that is what the film lies in.
         let coated = self.coat.as_ref().map_or(0.0, |c| c.factor);
@@ -201,10 +202,10 @@ impl Layers {
     }
 
     /// The direction in which the surface is brushed.
-    pub(super) fn brush<const TEXTURES: bool>(&self, surface: &Surface<'_>) -> Option<Brush> {
+    pub(super) fn brush<K: Kernel>(&self, surface: &Surface<'_>) -> Option<Brush> {
         let brushed = self.brushed.as_ref()?;
         let (mut direction, mut strength, mut set) = (brushed.rotation, brushed.strength, 0);
-        if let Some(t) = brushed.texture.as_ref().filter(|_| TEXTURES) {
+        if let Some(t) = brushed.texture.as_ref().filter(|_| K::TEXTURES) {
             set = t.uv_set();
             let texel = surface.timed(|| t.color(surface.uv(set), surface.footprint(set)));
             let along = texel.xy() * 2.0 - 1.0;
@@ -217,25 +218,21 @@ impl Layers {
     }
 
     /// The share of diffuse light that goes through, and as which lobe.
-    pub(super) fn through<const TEXTURES: bool>(
+    pub(super) fn through<K: Kernel>(
         &self,
         surface: &Surface<'_>,
         coat: Fresnel,
     ) -> Option<(DiffuseTransmission, f32)> {
         let through = self.through.as_ref()?;
-        let factor = (through.factor * scalar::<TEXTURES>(through.texture.as_ref(), surface)).clamp(0.0, 1.0);
-        let tint = through.color * color::<TEXTURES>(through.color_texture.as_ref(), surface).xyz();
+        let factor = (through.factor * scalar::<K>(through.texture.as_ref(), surface)).clamp(0.0, 1.0);
+        let tint = through.color * color::<K>(through.color_texture.as_ref(), surface).xyz();
         Some((DiffuseTransmission { color: tint * factor, coat }, factor))
     }
 }
 
 /// The normal of a normal map, in the world and on the viewer's side.
-pub(super) fn mapped<const TEXTURES: bool>(
-    surface: &Surface<'_>,
-    texture: Option<&TextureLookup>,
-    scale: f32,
-) -> Option<Vec3> {
-    let t = texture.filter(|_| TEXTURES)?;
+pub(super) fn mapped<K: Kernel>(surface: &Surface<'_>, texture: Option<&TextureLookup>, scale: f32) -> Option<Vec3> {
+    let t = texture.filter(|_| K::TEXTURES)?;
     let texel = surface.timed(|| t.color(surface.uv(t.uv_set()), surface.footprint(t.uv_set())));
     let n = (texel.xyz() * 2.0 - 1.0) * Vec3::new(scale, scale, 1.0);
     if n.is_finite() && n.xy() != Vec2::ZERO { surface.mapped_normal(n, t.uv_set()) } else { None }

@@ -15,13 +15,14 @@ use std::sync::Arc;
 use firsthit_import::scene::{ImageDesc, MaterialDesc, MaterialModel, TextureRef};
 use glam::Vec3;
 
-pub(crate) use bsdf::{Bsdf, MAX_LOBES};
+pub(crate) use bsdf::Bsdf;
 pub(crate) use dispersion::Colors;
 use fresnel::Fresnel;
 use lobes::{GgxReflection, GgxTransmission, Lambert, Lobe, SpecularReflection, SpecularTransmission};
 use microfacet::Masking;
 use pbr::Pbr;
 
+use crate::kernel::Kernel;
 use crate::surface::Surface;
 use crate::texture::{ColorSpace, Texture, TextureLookup};
 use crate::{EffectSet, StageError};
@@ -75,9 +76,9 @@ enum Model {
 
 /// What a surface does with light at one point.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Shading {
+pub(crate) struct Shading<K: Kernel> {
     /// How it scatters.
-    pub(crate) bsdf: Bsdf,
+    pub(crate) bsdf: Bsdf<K>,
     /// What it sends to the viewer by itself.
     pub(crate) emission: Vec3,
     /// Its colour, for the picture of that name.
@@ -172,6 +173,16 @@ impl Material {
         self.has_alpha() || self.is_clear()
     }
 
+    /// Whether a kernel has to know of light that goes through it.
+    pub(crate) fn goes_through(&self) -> bool {
+        self.solid || self.is_clear()
+    }
+
+    /// Whether a kernel has to know of layers.
+    pub(crate) fn is_layered(&self) -> bool {
+        matches!(self.model, Model::Layered(_))
+    }
+
     /// Whether its alpha counts.
     pub(crate) fn has_alpha(&self) -> bool {
         self.pbr().is_some_and(Pbr::has_alpha)
@@ -188,21 +199,21 @@ impl Material {
     }
 
     /// Whether light that goes through the boundary is not scattered there.
-    pub(crate) fn is_smooth<const TEXTURES: bool>(&self, surface: &Surface<'_>) -> bool {
+    pub(crate) fn is_smooth<K: Kernel>(&self, surface: &Surface<'_>) -> bool {
         match &self.model {
             Model::RoughGlass { .. } => false,
-            Model::Pbr(pbr) | Model::Layered(pbr) => pbr.is_smooth::<TEXTURES>(surface),
+            Model::Pbr(pbr) | Model::Layered(pbr) => pbr.is_smooth::<K>(surface),
             _ => true,
         }
     }
 
     /// How much of the surface is there: 1 all, 0 nothing.
-    pub(crate) fn coverage<const TEXTURES: bool>(&self, surface: &Surface<'_>) -> f32 {
-        self.pbr().map_or(1.0, |p| p.coverage::<TEXTURES>(surface))
+    pub(crate) fn coverage<K: Kernel>(&self, surface: &Surface<'_>) -> f32 {
+        self.pbr().map_or(1.0, |p| p.coverage::<K>(surface))
     }
 
     /// What light keeps that passes straight through the surface at this cosine, where it is there.
-    pub(crate) fn straight_through<const TEXTURES: bool>(&self, surface: &Surface<'_>, cos: f32) -> Vec3 {
+    pub(crate) fn straight_through<K: Kernel>(&self, surface: &Surface<'_>, cos: f32) -> Vec3 {
         if self.conventions.reference {
             return Vec3::ZERO;
         }
@@ -211,7 +222,7 @@ impl Material {
                 // From either side the angle outside counts; the ray is taken as not bent.
                 Vec3::splat(1.0 - fresnel::dielectric(cos, self.ior.max(1.0)))
             }
-            Model::Pbr(pbr) | Model::Layered(pbr) => pbr.straight_through::<TEXTURES>(surface, cos),
+            Model::Pbr(pbr) | Model::Layered(pbr) => pbr.straight_through::<K>(surface, cos),
             _ => Vec3::ZERO,
         }
     }
@@ -236,28 +247,26 @@ impl Material {
     }
 
     /// Radiance sent to the viewer by the surface itself.
-    pub(crate) fn emission<const TEXTURES: bool>(&self, surface: &Surface<'_>) -> Vec3 {
+    pub(crate) fn emission<K: Kernel>(&self, surface: &Surface<'_>) -> Vec3 {
         match &self.model {
-            Model::Pbr(pbr) | Model::Layered(pbr) if surface.front || pbr.double_sided => {
-                pbr.emission::<TEXTURES>(surface)
-            }
+            Model::Pbr(pbr) | Model::Layered(pbr) if surface.front || pbr.double_sided => pbr.emission::<K>(surface),
             Model::Emission(radiance) if surface.front => *radiance,
             _ => Vec3::ZERO,
         }
     }
 
     /// Radiance that the surface sends to a light's sample there: alpha lets through what it does not cover.
-    pub(crate) fn glow<const TEXTURES: bool>(&self, surface: &Surface<'_>) -> Vec3 {
-        self.emission::<TEXTURES>(surface) * self.coverage::<TEXTURES>(surface)
+    pub(crate) fn glow<K: Kernel>(&self, surface: &Surface<'_>) -> Vec3 {
+        self.emission::<K>(surface) * self.coverage::<K>(surface)
     }
 
     /// Everything about the surface at one point.
-    pub(crate) fn shade<const TEXTURES: bool>(&self, surface: &Surface<'_>) -> Shading {
-        let emission = self.emission::<TEXTURES>(surface);
+    pub(crate) fn shade<K: Kernel>(&self, surface: &Surface<'_>) -> Shading<K> {
+        let emission = self.emission::<K>(surface);
         let normal = surface.smooth;
         let (bsdf, base_color) = match &self.model {
-            Model::Pbr(pbr) => return pbr.shade::<TEXTURES, false>(surface, self.conventions, emission),
-            Model::Layered(pbr) => return pbr.shade::<TEXTURES, true>(surface, self.conventions, emission),
+            Model::Pbr(pbr) => return pbr.shade::<K, false>(surface, self.conventions, emission),
+            Model::Layered(pbr) if K::LAYERS => return pbr.shade::<K, true>(surface, self.conventions, emission),
             Model::Diffuse(albedo) => {
                 (Bsdf::new(normal).with(Lobe::Lambert(Lambert { albedo: *albedo, coat: None })), *albedo)
             }
@@ -265,7 +274,7 @@ impl Material {
                 let lobe = SpecularReflection { fresnel: Fresnel::Constant(*reflectance) };
                 (Bsdf::new(self.bent(surface)).with(Lobe::SpecularReflection(lobe)), *reflectance)
             }
-            Model::Glass => {
+            Model::Glass if K::THROUGH => {
                 let eta = self.eta(surface);
                 let fresnel = Fresnel::Dielectric { eta };
                 let bsdf = Bsdf::new(self.bent(surface))
@@ -283,7 +292,7 @@ impl Material {
                 let lobe = GgxReflection { alpha: *alpha, fresnel, masking: Masking::Correlated, scale: Vec3::ONE };
                 (Bsdf::new(self.bent(surface)).with(Lobe::GgxReflection(lobe)), *reflectance)
             }
-            Model::RoughGlass { alpha } => {
+            Model::RoughGlass { alpha } if K::THROUGH => {
                 let eta = self.eta(surface);
                 let (alpha, fresnel) = (*alpha, Fresnel::Dielectric { eta });
                 let transmission = GgxTransmission { alpha, eta, fresnel, tint: Vec3::ONE, scale: self.scaling(eta) };
@@ -293,7 +302,10 @@ impl Material {
                     .with(Lobe::GgxTransmission(transmission));
                 (bsdf, Vec3::ONE)
             }
-            Model::Emission(_) => (Bsdf::new(normal), Vec3::ZERO),
+            // The last three are met by kernels that can do them alone.
+            Model::Emission(_) | Model::Layered(_) | Model::Glass | Model::RoughGlass { .. } => {
+                (Bsdf::new(normal), Vec3::ZERO)
+            }
         };
         Shading { bsdf, emission, base_color }
     }

@@ -22,6 +22,7 @@ use super::lobes::{
 };
 use super::microfacet::Masking;
 use super::{Bsdf, Conventions, LEAST_ALPHA, Shading, Textures};
+use crate::kernel::Kernel;
 use crate::surface::Surface;
 use crate::texture::{ColorSpace, TextureLookup};
 use crate::{EffectSet, StageError};
@@ -73,16 +74,16 @@ pub(super) fn absorption(desc: &PbrMaterial, conventions: Conventions) -> Vec3 {
 }
 
 /// The share of the colour texture, scalar textures and vertex colour of a point: 1 where there is none.
-pub(super) fn scalar<const TEXTURES: bool>(lookup: Option<&TextureLookup>, surface: &Surface<'_>) -> f32 {
+pub(super) fn scalar<K: Kernel>(lookup: Option<&TextureLookup>, surface: &Surface<'_>) -> f32 {
     match lookup {
-        Some(t) if TEXTURES => surface.timed(|| t.scalar(surface.uv(t.uv_set()), surface.footprint(t.uv_set()))),
+        Some(t) if K::TEXTURES => surface.timed(|| t.scalar(surface.uv(t.uv_set()), surface.footprint(t.uv_set()))),
         _ => 1.0,
     }
 }
 
-pub(super) fn color<const TEXTURES: bool>(lookup: Option<&TextureLookup>, surface: &Surface<'_>) -> glam::Vec4 {
+pub(super) fn color<K: Kernel>(lookup: Option<&TextureLookup>, surface: &Surface<'_>) -> glam::Vec4 {
     match lookup {
-        Some(t) if TEXTURES => surface.timed(|| t.color(surface.uv(t.uv_set()), surface.footprint(t.uv_set()))),
+        Some(t) if K::TEXTURES => surface.timed(|| t.color(surface.uv(t.uv_set()), surface.footprint(t.uv_set()))),
         _ => glam::Vec4::ONE,
     }
 }
@@ -170,93 +171,95 @@ impl Pbr {
         self.emissive_texture.is_none() && !self.has_alpha()
     }
 
-    fn base<const TEXTURES: bool>(&self, surface: &Surface<'_>) -> glam::Vec4 {
-        self.base_color * color::<TEXTURES>(self.base_color_texture.as_ref(), surface) * surface.color()
+    fn base<K: Kernel>(&self, surface: &Surface<'_>) -> glam::Vec4 {
+        self.base_color * color::<K>(self.base_color_texture.as_ref(), surface) * surface.color()
     }
 
-    pub(super) fn coverage<const TEXTURES: bool>(&self, surface: &Surface<'_>) -> f32 {
+    pub(super) fn coverage<K: Kernel>(&self, surface: &Surface<'_>) -> f32 {
         if self.alpha == AlphaMode::Opaque {
             return 1.0;
         }
-        let alpha = self.base::<TEXTURES>(surface).w * scalar::<TEXTURES>(self.opacity_texture.as_ref(), surface);
+        let alpha = self.base::<K>(surface).w * scalar::<K>(self.opacity_texture.as_ref(), surface);
         match self.alpha {
             AlphaMode::Mask { cutoff } => f32::from(u8::from(alpha >= cutoff)),
             _ => alpha.clamp(0.0, 1.0),
         }
     }
 
-    pub(super) fn straight_through<const TEXTURES: bool>(&self, surface: &Surface<'_>, cos: f32) -> Vec3 {
+    pub(super) fn straight_through<K: Kernel>(&self, surface: &Surface<'_>, cos: f32) -> Vec3 {
         if !self.is_clear() {
             return Vec3::ZERO;
         }
-        let base = self.base::<TEXTURES>(surface).xyz();
-        let metallic = (self.metallic * scalar::<TEXTURES>(self.metallic_texture.as_ref(), surface)).clamp(0.0, 1.0);
+        let base = self.base::<K>(surface).xyz();
+        let metallic = (self.metallic * scalar::<K>(self.metallic_texture.as_ref(), surface)).clamp(0.0, 1.0);
         let transmission =
-            (self.transmission * scalar::<TEXTURES>(self.transmission_texture.as_ref(), surface)).clamp(0.0, 1.0);
-        let mut fresnel = self.fresnel::<TEXTURES>(surface, base, metallic, 1.0);
+            (self.transmission * scalar::<K>(self.transmission_texture.as_ref(), surface)).clamp(0.0, 1.0);
+        let mut fresnel = self.fresnel::<K>(surface, base, metallic, 1.0);
         let mut below = 1.0;
         if let Some(layers) = self.layers.as_deref() {
-            fresnel = layers.filmed::<TEXTURES>(surface, fresnel);
-            below = layers.passed::<TEXTURES>(surface, cos);
+            fresnel = layers.filmed::<K>(surface, fresnel);
+            below = layers.passed::<K>(surface, cos);
         }
         base * (transmission * (1.0 - metallic) * below) * fresnel.passed(cos)
     }
 
-    pub(super) fn is_smooth<const TEXTURES: bool>(&self, surface: &Surface<'_>) -> bool {
-        let roughness = self.roughness * scalar::<TEXTURES>(self.roughness_texture.as_ref(), surface);
+    pub(super) fn is_smooth<K: Kernel>(&self, surface: &Surface<'_>) -> bool {
+        let roughness = self.roughness * scalar::<K>(self.roughness_texture.as_ref(), surface);
         roughness * roughness <= LEAST_ALPHA
     }
 
-    pub(super) fn emission<const TEXTURES: bool>(&self, surface: &Surface<'_>) -> Vec3 {
+    pub(super) fn emission<K: Kernel>(&self, surface: &Surface<'_>) -> Vec3 {
         if self.unlit {
-            return self.base::<TEXTURES>(surface).xyz();
+            return self.base::<K>(surface).xyz();
         }
         if self.emissive == Vec3::ZERO {
             return Vec3::ZERO;
         }
-        self.emissive * color::<TEXTURES>(self.emissive_texture.as_ref(), surface).xyz()
+        self.emissive * color::<K>(self.emissive_texture.as_ref(), surface).xyz()
     }
 
-    fn fresnel<const TEXTURES: bool>(&self, surface: &Surface<'_>, base: Vec3, metallic: f32, eta: f32) -> Fresnel {
-        let specular = self.specular * scalar::<TEXTURES>(self.specular_texture.as_ref(), surface);
-        let tint = self.specular_color * color::<TEXTURES>(self.specular_color_texture.as_ref(), surface).xyz();
+    fn fresnel<K: Kernel>(&self, surface: &Surface<'_>, base: Vec3, metallic: f32, eta: f32) -> Fresnel {
+        let specular = self.specular * scalar::<K>(self.specular_texture.as_ref(), surface);
+        let tint = self.specular_color * color::<K>(self.specular_color_texture.as_ref(), surface).xyz();
         let f0 = (tint * normal_incidence(self.ior)).min(Vec3::ONE) * specular;
         Fresnel::Schlick { f0: f0.lerp(base, metallic), f90: specular + (1.0 - specular) * metallic, eta }
     }
 
     /// `LAYERS`: whether what is laid over the base is looked at. Materials that have nothing there are shaded by code
     /// that knows of nothing.
-    pub(super) fn shade<const TEXTURES: bool, const LAYERS: bool>(
+    pub(super) fn shade<K: Kernel, const LAYERS: bool>(
         &self,
         surface: &Surface<'_>,
         conventions: Conventions,
         emission: Vec3,
-    ) -> Shading {
-        let base = self.base::<TEXTURES>(surface).xyz();
+    ) -> Shading<K> {
+        let base = self.base::<K>(surface).xyz();
         if self.unlit {
             return Shading { bsdf: Bsdf::new(surface.smooth), emission, base_color: base };
         }
         let layers = self.layers.as_deref().filter(|_| LAYERS);
-        let mut normal = self.normal::<TEXTURES>(surface);
+        let mut normal = self.normal::<K>(surface);
         if !conventions.reference {
             normal = surface.bent(normal);
         }
-        let metallic = (self.metallic * scalar::<TEXTURES>(self.metallic_texture.as_ref(), surface)).clamp(0.0, 1.0);
-        let roughness = (self.roughness * scalar::<TEXTURES>(self.roughness_texture.as_ref(), surface)).clamp(0.0, 1.0);
-        let transmission =
-            (self.transmission * scalar::<TEXTURES>(self.transmission_texture.as_ref(), surface)).clamp(0.0, 1.0);
+        let metallic = (self.metallic * scalar::<K>(self.metallic_texture.as_ref(), surface)).clamp(0.0, 1.0);
+        let roughness = (self.roughness * scalar::<K>(self.roughness_texture.as_ref(), surface)).clamp(0.0, 1.0);
+        let transmission = match K::THROUGH {
+            true => (self.transmission * scalar::<K>(self.transmission_texture.as_ref(), surface)).clamp(0.0, 1.0),
+            false => 0.0,
+        };
         let alpha = (roughness * roughness).max(LEAST_ALPHA);
-        let (eta, parted) = self.boundary(surface);
+        let (eta, parted) = if K::THROUGH { self.boundary(surface) } else { (1.0, Vec3::ONE) };
         let cos = normal.dot(surface.wo);
 
-        let bare = self.fresnel::<TEXTURES>(surface, base, metallic, eta);
-        let fresnel = layers.map_or(bare, |l| l.filmed::<TEXTURES>(surface, bare));
+        let bare = self.fresnel::<K>(surface, base, metallic, eta);
+        let fresnel = layers.map_or(bare, |l| l.filmed::<K>(surface, bare));
         let coat = fresnel.over_diffuse(self.specular_color != Vec3::ONE || self.specular_color_texture.is_some());
         let mut compensation = Vec3::ONE;
         let mut compensation_through = 1.0;
         if let (true, Fresnel::Schlick { f0, .. }) = (conventions.energy_compensation, bare) {
             compensation = energy::compensation(cos, roughness, f0);
-            if transmission > 0.0 {
+            if K::THROUGH && transmission > 0.0 {
                 compensation_through = match &self.boundary {
                     Some(boundary) => boundary.compensation(cos, roughness, surface.front),
                     None => energy::thin_compensation(cos, roughness),
@@ -264,7 +267,7 @@ impl Pbr {
                 compensation = compensation.lerp(Vec3::splat(compensation_through), transmission * (1.0 - metallic));
             }
         }
-        let brush = layers.and_then(|l| l.brush::<TEXTURES>(surface));
+        let brush = layers.and_then(|l| l.brush::<K>(surface));
         let mut bsdf = match &brush {
             Some(brush) => Bsdf::along(normal, brush.direction),
             None => Bsdf::new(normal),
@@ -273,10 +276,10 @@ impl Pbr {
         let mut below = 1.0;
         let (mut over, mut fibres) = (None, None);
         if let Some(layers) = layers {
-            if let Some((lobe, passed)) = layers.coat::<TEXTURES>(surface, !conventions.reference, |w| bsdf.local(w)) {
+            if let Some((lobe, passed)) = layers.coat::<K>(surface, !conventions.reference, |w| bsdf.local(w)) {
                 (over, below) = (Some(lobe), passed);
             }
-            if let Some((mut sheen, passed)) = layers.sheen::<TEXTURES>(surface, cos) {
+            if let Some((mut sheen, passed)) = layers.sheen::<K>(surface, cos) {
                 sheen.color *= below;
                 below *= passed;
                 fibres = Some(Lobe::Sheen(sheen));
@@ -285,7 +288,7 @@ impl Pbr {
 
         let mut diffuse = base * ((1.0 - metallic) * (1.0 - transmission) * below);
         let mut through = None;
-        if let Some((mut lobe, share)) = layers.and_then(|l| l.through::<TEXTURES>(surface, coat)) {
+        if let Some((mut lobe, share)) = layers.and_then(|l| l.through::<K>(surface, coat)) {
             diffuse *= 1.0 - share;
             lobe.color *= (1.0 - metallic) * (1.0 - transmission) * below;
             through = Some(lobe).filter(|l| l.color.max_element() > 0.0).map(Lobe::DiffuseTransmission);
@@ -304,7 +307,7 @@ impl Pbr {
             });
         }
         let mut tint = base * ((1.0 - metallic) * transmission * below) * parted;
-        if tint.max_element() > 0.0 {
+        if K::THROUGH && tint.max_element() > 0.0 {
             let smooth = alpha <= LEAST_ALPHA;
             if !smooth {
                 tint *= compensation_through;
@@ -343,11 +346,11 @@ impl Pbr {
     }
 
     /// The shading normal with normal and bump maps, on the viewer's side.
-    fn normal<const TEXTURES: bool>(&self, surface: &Surface<'_>) -> Vec3 {
-        if !TEXTURES || (self.normal_texture.is_none() && self.bump_texture.is_none()) {
+    fn normal<K: Kernel>(&self, surface: &Surface<'_>) -> Vec3 {
+        if !K::TEXTURES || (self.normal_texture.is_none() && self.bump_texture.is_none()) {
             return surface.smooth;
         }
-        let mut normal = layers::mapped::<TEXTURES>(surface, self.normal_texture.as_ref(), self.normal_scale);
+        let mut normal = layers::mapped::<K>(surface, self.normal_texture.as_ref(), self.normal_scale);
         if let Some(t) = &self.bump_texture {
             let (uv, width) = (surface.uv(t.uv_set()), surface.footprint(t.uv_set()));
             let step = t.texel_step().max(width);

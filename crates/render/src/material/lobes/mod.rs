@@ -17,6 +17,8 @@ mod thin;
 use bitflags::bitflags;
 use glam::Vec3;
 
+use crate::kernel::Kernel;
+
 pub(crate) use anisotropic::AnisotropicGgx;
 pub(crate) use clearcoat::Clearcoat;
 pub(crate) use diffuse::Lambert;
@@ -82,17 +84,18 @@ pub(crate) enum Lobe {
 macro_rules! each {
     ($self:ident, $lobe:ident => $body:expr, else $nothing:expr) => {
         match $self {
-            Lobe::Nothing => $nothing,
             Lobe::Lambert($lobe) => $body,
             Lobe::SpecularReflection($lobe) => $body,
-            Lobe::SpecularTransmission($lobe) => $body,
             Lobe::GgxReflection($lobe) => $body,
-            Lobe::GgxTransmission($lobe) => $body,
-            Lobe::ThinTransmission($lobe) => $body,
-            Lobe::AnisotropicGgx($lobe) => $body,
-            Lobe::Clearcoat($lobe) => $body,
-            Lobe::Sheen($lobe) => $body,
-            Lobe::DiffuseTransmission($lobe) => $body,
+            Lobe::SpecularTransmission($lobe) if K::THROUGH => $body,
+            Lobe::GgxTransmission($lobe) if K::THROUGH => $body,
+            Lobe::ThinTransmission($lobe) if K::THROUGH => $body,
+            Lobe::AnisotropicGgx($lobe) if K::LAYERS => $body,
+            Lobe::Clearcoat($lobe) if K::LAYERS => $body,
+            Lobe::Sheen($lobe) if K::LAYERS => $body,
+            Lobe::DiffuseTransmission($lobe) if K::LAYERS => $body,
+            // Nothing, and what a kernel does not meet.
+            _ => $nothing,
         }
     };
 }
@@ -119,17 +122,17 @@ impl Lobe {
     }
 
     /// f(wo, wi) * |cos(wi)|; 0 for delta lobes.
-    pub(crate) fn eval(&self, wo: Vec3, wi: Vec3) -> Vec3 {
+    pub(crate) fn eval<K: Kernel>(&self, wo: Vec3, wi: Vec3) -> Vec3 {
         each!(self, lobe => lobe.eval(wo, wi), else Vec3::ZERO)
     }
 
     /// Density of [`Lobe::sample`] over solid angle; 0 for delta lobes.
-    pub(crate) fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+    pub(crate) fn pdf<K: Kernel>(&self, wo: Vec3, wi: Vec3) -> f32 {
         each!(self, lobe => lobe.pdf(wo, wi), else 0.0)
     }
 
     /// Draws a direction. `None`: the light of this draw is lost.
-    pub(crate) fn sample(&self, wo: Vec3, u: [f32; 2]) -> Option<LobeSample> {
+    pub(crate) fn sample<K: Kernel>(&self, wo: Vec3, u: [f32; 2]) -> Option<LobeSample> {
         each!(self, lobe => lobe.sample(wo, u), else None)
     }
 
@@ -143,7 +146,7 @@ impl Lobe {
     }
 
     /// About how much of the light from everywhere goes to `wo`: for choosing between lobes.
-    pub(crate) fn albedo(&self, wo: Vec3) -> Vec3 {
+    pub(crate) fn albedo<K: Kernel>(&self, wo: Vec3) -> Vec3 {
         each!(self, lobe => lobe.albedo(wo), else Vec3::ZERO)
     }
 }
