@@ -19,9 +19,21 @@ impl Scene {
         let fallback = SurfacePoint { position: ray.at(hit.t), normal: hit.normal, error: 0.0 };
         let Some((instance, surface)) = self.surface(&hit.id) else { return fallback };
         let transform = &instance.transform;
+        let BuildOptions { precision, guards, .. } = self.options();
         let (point, error, normal) = match surface {
+            // Hits of queries have unit normals; filters see others.
+            Surface::Triangle(v) if transform.is_uniform() && hit.normal.is_normalized() => {
+                let (point, error) = on_triangle(v, hit, precision);
+                let position = transform.point(point);
+                let error = if precision == Precision::Robust && !guards.contains(Guards::OFFSET) {
+                    CONSTANT_OFFSET
+                } else {
+                    distance_uniform(transform, point, error, hit.normal, position)
+                };
+                return SurfacePoint { position, normal: hit.normal, error };
+            }
             Surface::Triangle(v) => {
-                let (point, error) = on_triangle(v, hit, self.options().precision);
+                let (point, error) = on_triangle(v, hit, precision);
                 (point, error, triangle::normal(v).unwrap_or(DVec3::ZERO))
             }
             Surface::Shape(s) => {
@@ -34,7 +46,6 @@ impl Scene {
             }
         };
         let position = transform.point(point);
-        let BuildOptions { precision, guards, .. } = self.options();
         if precision == Precision::Robust && !guards.contains(Guards::OFFSET) {
             return SurfacePoint { position, normal: hit.normal, error: CONSTANT_OFFSET };
         }
@@ -54,8 +65,7 @@ fn on_triangle(v: [DVec3; 3], hit: &Hit, precision: Precision) -> (DVec3, DVec3)
         // The test's distance comes from the plane in f64, whose normal tilts by some roundings times the aspect.
         Precision::Robust | Precision::Double | Precision::Exact => {
             let e3 = e2 - e1;
-            let (a, b, c) = (e1.length(), e2.length(), e3.length());
-            let longest = a.max(b).max(c);
+            let longest = e1.length_squared().max(e2.length_squared()).max(e3.length_squared()).sqrt();
             let area = triangle::area_vector(v).length();
             let tilt = if area > 0.0 { longest * longest / area } else { 1.0 };
             magnitude * gamma(8) + DVec3::splat(longest * tilt * gamma(8))
@@ -76,6 +86,19 @@ fn distance(transform: &Transform, point: DVec3, error: DVec3, normal: DVec3, po
     let unit = (transform.inverse_linear().transpose() * normal).length();
     let world = transform.normal(normal).abs().dot(to_world + position.abs() * gamma(2));
     if unit > 0.0 { object / unit + world } else { world }
+}
+
+/// The same where all lengths change alike, as in most scenes: every matrix is a number, and the normal is that of the
+/// world.
+#[inline]
+fn distance_uniform(transform: &Transform, point: DVec3, error: DVec3, normal: DVec3, position: DVec3) -> f64 {
+    let (scale, inverse) = (transform.linear().x_axis.x.abs(), transform.inverse_linear().x_axis.x.abs());
+    let (point, translation) = (point.abs(), transform.translation());
+    let to_world = (point * scale + translation.abs()) * gamma(4);
+    let back = (position + to_world - translation).abs() * (inverse * gamma(4));
+    let bijection = point * (scale * inverse * gamma(16));
+    let normal = normal.abs();
+    normal.dot(error + back + bijection) / inverse + normal.dot(to_world + position.abs() * gamma(2))
 }
 
 fn gamma(n: u32) -> f64 {

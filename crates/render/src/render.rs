@@ -1,11 +1,11 @@
 //! The driver: a stage, options, and a picture as the answer.
 
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-use firsthit_accel::TraversalCounts;
-use firsthit_geometry::Aabb;
+use firsthit_accel::{Hit, TraversalCounts};
 use firsthit_geometry::clip::{ClipRegion, HalfSpace};
+use firsthit_geometry::{Aabb, Ray};
 use glam::Vec3;
 use rayon::iter::{IndexedParallelIterator, ParallelIterator};
 
@@ -298,6 +298,39 @@ enum Method {
     Values(Aov, f32),
 }
 
+/// A sample that was begun.
+struct Shot {
+    pixel: (u32, u32),
+    sampler: PixelSampler,
+    /// Where in the picture, 0 to 1 from the upper left.
+    screen: [f32; 2],
+    /// Whether its rays are timed.
+    timed: bool,
+    /// How long it took to begin it, if all of it is timed.
+    begun: Option<Duration>,
+}
+
+/// Samples that were begun and have the same way to go at first.
+#[derive(Default)]
+struct Shots {
+    list: Vec<Shot>,
+    rays: Vec<Ray<f64>>,
+    /// What the rays meet.
+    hits: Vec<Option<Hit>>,
+}
+
+impl Shots {
+    fn push(&mut self, shot: Shot, ray: Ray<f64>) {
+        self.list.push(shot);
+        self.rays.push(ray);
+    }
+
+    /// Some packets of rays, and few enough to stay in the nearest cache.
+    fn are_many(&self) -> bool {
+        self.list.len() >= 64
+    }
+}
+
 /// Everything that all samples of a render share.
 struct Job<'a> {
     stage: &'a Stage,
@@ -424,6 +457,7 @@ impl<'a> Job<'a> {
         monitor: &dyn Monitor,
     ) -> Done {
         let mut done = Done::default();
+        let mut shots = Shots::default();
         for y in band.rows() {
             done.late = self.is_late(samples.start);
             if done.late || monitor.cancelled() {
@@ -435,24 +469,76 @@ impl<'a> Job<'a> {
                 }
                 let profiled = self.options.profile && matches!(self.method, Method::Path(_));
                 let place = x.wrapping_mul(31).wrapping_add(y.wrapping_mul(17));
-                tracer.timed = place.is_multiple_of(if profiled { PROFILED } else { TIMED });
-                tracer.clock = Some(clock).filter(|_| profiled && tracer.timed);
+                let timed = place.is_multiple_of(if profiled { PROFILED } else { TIMED });
+                tracer.clock = Some(clock).filter(|_| profiled && timed);
                 // What a pixel has it need not get again.
                 let from = self.options.first_sample + band.pixel(x, y)[0].count();
                 for sample in samples.start.max(from)..samples.end {
                     let started = tracer.clock.map(|_| Instant::now());
-                    done.bad += u64::from(!self.sample(tracer, band.pixel(x, y), x, y, sample));
-                    if let Some(started) = started {
-                        tracer.timing.parts.whole.note(started.elapsed());
+                    let (shot, ray) = self.shot(tracer, (x, y), sample, timed);
+                    let begun = started.map(|s| s.elapsed());
+                    shots.push(Shot { begun, ..shot }, ray);
+                    if shots.are_many() {
+                        done.bad += self.shoot(tracer, clock, band, &mut shots);
                     }
                     done.samples += 1;
                 }
             }
         }
+        done.bad += self.shoot(tracer, clock, band, &mut shots);
         done.rays = tracer.counts;
         done.timing = tracer.timing;
         done.timing.parts.add(&clock.parts());
         done
+    }
+
+    /// Begins a sample: its ray.
+    #[inline]
+    fn shot<K: Kernel>(
+        &self,
+        tracer: &Tracer<'_, K>,
+        (x, y): (u32, u32),
+        sample: u32,
+        timed: bool,
+    ) -> (Shot, Ray<f64>) {
+        let sampler = PixelSampler::of(self.options.sampler, self.options.seed, (x, y), sample);
+        let [dx, dy] = self.filter.offset(tracer.draw2(&sampler, Dimension::Pixel));
+        let at = [f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy];
+        let ray = self.camera.ray(at);
+        let screen = [(at[0] / f64::from(self.options.width)) as f32, (at[1] / f64::from(self.options.height)) as f32];
+        (Shot { pixel: (x, y), sampler, screen, timed, begun: None }, ray)
+    }
+
+    /// Takes the samples that were begun, in their order; the answer: how many of them were no light.
+    fn shoot<'b, K: Kernel>(
+        &self,
+        tracer: &mut Tracer<'b, K>,
+        clock: &'b Clock,
+        band: &mut Band<'_>,
+        shots: &mut Shots,
+    ) -> u64 {
+        let mut bad = 0;
+        let mut each = Duration::ZERO;
+        shots.hits.clear();
+        shots.hits.resize(shots.list.len(), None);
+        if matches!(self.method, Method::Path(_)) {
+            // Camera rays go the same way: together.
+            let timed = shots.list.iter().filter(|s| s.timed).count() as u64;
+            each = tracer.camera_hits(&shots.rays, &mut shots.hits, timed);
+        }
+        for ((shot, ray), hit) in shots.list.iter().zip(&shots.rays).zip(&shots.hits) {
+            tracer.timed = shot.timed;
+            tracer.clock = shot.begun.map(|_| clock);
+            let (x, y) = shot.pixel;
+            let started = shot.begun.map(|begun| (begun + each, Instant::now()));
+            bad += u64::from(!self.sample(tracer, band.pixel(x, y), shot, *ray, *hit));
+            if let Some((before, started)) = started {
+                tracer.timing.parts.whole.note(before + started.elapsed());
+            }
+        }
+        shots.list.clear();
+        shots.rays.clear();
+        bad
     }
 
     /// Takes one sample; false if its numbers were no light.
@@ -460,18 +546,13 @@ impl<'a> Job<'a> {
         &self,
         tracer: &mut Tracer<'_, K>,
         pixel: &mut [Accumulator],
-        x: u32,
-        y: u32,
-        sample: u32,
+        &Shot { sampler, screen, .. }: &Shot,
+        ray: Ray<f64>,
+        hit: Option<Hit>,
     ) -> bool {
-        let sampler = PixelSampler::of(self.options.sampler, self.options.seed, (x, y), sample);
-        let [dx, dy] = self.filter.offset(tracer.draw2(&sampler, Dimension::Pixel));
-        let at = [f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy];
-        let ray = self.camera.ray(at);
-        let screen = [(at[0] / f64::from(self.options.width)) as f32, (at[1] / f64::from(self.options.height)) as f32];
         let limits = |follow| Limits { bounces: self.options.max_depth.min(MOST_BOUNCES), follow };
         let mut seen = match self.method {
-            Method::Path(follow) => tracer.path(ray, self.cone, screen, sampler, limits(follow)),
+            Method::Path(follow) => tracer.path(ray, hit, self.cone, screen, sampler, limits(follow)),
             Method::Light(follow) => tracer.radiance(ray, self.cone, screen, sampler, limits(follow)),
             Method::Occlusion(reach) => tracer.ambient_occlusion(ray, reach, sampler),
             Method::Values(..) => tracer.values(ray, self.cone),

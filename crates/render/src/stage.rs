@@ -90,6 +90,8 @@ pub(crate) struct Flags {
     pub(crate) alpha: bool,
     /// Shadow rays may pass.
     pub(crate) lets_through: bool,
+    /// It looks textures up.
+    pub(crate) textured: bool,
 }
 
 impl Flags {
@@ -185,6 +187,7 @@ impl Stage {
             culls: !reference && m.culls(),
             alpha: m.has_alpha(),
             lets_through: m.lets_through(),
+            textured: m.is_textured(),
         });
         let flags: Vec<Flags> = flags.collect();
         // What no surface has keeps no kernel from being small.

@@ -105,9 +105,10 @@ impl World {
             wo: Vec3::Z,
             geometric: Vec3::Z,
             smooth: Vec3::Z,
-            lift: DVec3::ZERO,
+            curved: false,
             width: 0.0,
             colors: Colors::All(1),
+            seen: None,
             clock: None,
         }
     }
@@ -130,9 +131,10 @@ impl World {
             wo,
             geometric,
             smooth: geometric,
-            lift: DVec3::ZERO,
+            curved: false,
             width,
             colors: Colors::All(1),
+            seen: None,
             clock: None,
         };
         if let Some(n) = surface.vertex_normal() {
@@ -140,7 +142,7 @@ impl World {
             // Vertex normals that disagree with the winding are turned with it.
             let n = if n.dot(geometric) < 0.0 { -n } else { n };
             surface.smooth = n.try_normalize().unwrap_or(geometric);
-            surface.lift = surface.smooth_offset();
+            surface.curved = true;
         }
         surface
     }
@@ -169,12 +171,14 @@ pub(crate) struct Surface<'a> {
     pub(crate) geometric: Vec3,
     /// Interpolated normal on the viewer's side.
     pub(crate) smooth: Vec3,
-    /// From the point to the curved surface that the vertex normals mean: see [`Surface::smooth_offset`].
-    pub(crate) lift: DVec3,
+    /// Whether there are vertex normals.
+    curved: bool,
     /// Width of the cone of view here, world units.
     width: f32,
     /// Which colours the path is about that came here.
     pub(crate) colors: Colors,
+    /// Coordinates of the first set, and the footprint there, once they are known.
+    seen: Option<(Vec2, f32)>,
     /// Times the look-ups of textures here.
     pub(crate) clock: Option<&'a Clock>,
 }
@@ -197,8 +201,16 @@ impl Surface<'_> {
         }
     }
 
+    /// Works out once what every texture of the first set asks for.
+    pub(crate) fn look(&mut self) {
+        self.seen = Some(self.timed(|| (self.uv(0), self.footprint(0))));
+    }
+
     /// Texture coordinates; (0, 0) where the mesh lacks the set.
     pub(crate) fn uv(&self, set: usize) -> Vec2 {
+        if let (Some((uv, _)), 0) = (self.seen, set) {
+            return uv;
+        }
         match self.part {
             Part::Triangle { mesh, corners, weights } => match mesh.uvs.get(set).filter(|uvs| !uvs.is_empty()) {
                 Some(uvs) => (0..3).map(|i| uvs[corners[i]] * weights[i]).sum(),
@@ -227,6 +239,9 @@ impl Surface<'_> {
     /// How wide the cone of view is in texture coordinates. Where the surface is seen at an angle, between the width
     /// across and the one along: its area is right.
     pub(crate) fn footprint(&self, set: usize) -> f32 {
+        if let (Some((_, footprint)), 0) = (self.seen, set) {
+            return footprint;
+        }
         if self.width <= 0.0 {
             return 0.0;
         }
@@ -256,9 +271,12 @@ impl Surface<'_> {
 
     /// Seen from the light, a coarse mesh with smooth normals shadows itself along its edges. Shadow rays therefore
     /// start on the curved surface that the normals mean: Hanika, "Hacking the Shadow Terminator" (Ray Tracing Gems
-    /// II, chapter 4).
-    fn smooth_offset(&self) -> DVec3 {
+    /// II, chapter 4). This is the way from the point to there.
+    pub(crate) fn lift(&self) -> DVec3 {
         let Part::Triangle { mesh, corners, weights } = self.part else { return DVec3::ZERO };
+        if !self.curved {
+            return DVec3::ZERO;
+        }
         let point: Vec3 = (0..3).map(|i| mesh.positions[corners[i]] * weights[i]).sum();
         let outward = self.instance.normals * (0..3).map(|i| mesh.normals[corners[i]] * weights[i]).sum::<Vec3>();
         let side = if outward.dot(self.smooth) < 0.0 { -1.0 } else { 1.0 };

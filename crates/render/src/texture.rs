@@ -8,6 +8,7 @@ use std::sync::{Arc, LazyLock};
 
 use firsthit_import::scene::{Channel, Filter, ImageDesc, Pixels, TextureRef, Wrap};
 use glam::{Affine2, Vec2, Vec3, Vec4, Vec4Swizzles};
+use rayon::prelude::*;
 
 use crate::light::environment::luminance;
 use crate::view::{linear_to_srgb, srgb_to_linear};
@@ -100,8 +101,8 @@ impl Texture {
         let level = &self.levels[level];
         let (x, fx) = neighbours(wrap[0], uv.x, level.width);
         let (y, fy) = neighbours(wrap[1], uv.y, level.height);
-        let along = |y| level.texel(self.space, x[0], y).lerp(level.texel(self.space, x[1], y), fx);
-        along(y[0]).lerp(along(y[1]), fy)
+        let [a, b, c, d] = level.four(self.space, x, y);
+        a.lerp(b, fx).lerp(c.lerp(d, fx), fy)
     }
 
     /// `width`: of what is looked at, in texels of the whole image.
@@ -182,7 +183,11 @@ impl TextureLookup {
     #[inline]
     #[must_use]
     pub fn scalar(&self, uv: Vec2, footprint: f32) -> f32 {
-        let value = self.lookup(uv, footprint);
+        self.pick(self.lookup(uv, footprint))
+    }
+
+    #[inline]
+    fn pick(&self, value: Vec4) -> f32 {
         let value = match self.channel {
             Channel::Red => value.x,
             Channel::Green => value.y,
@@ -199,6 +204,20 @@ impl TextureLookup {
         if self.texels_per_uv > 0.0 { 1.0 / self.texels_per_uv } else { 1.0 }
     }
 
+    /// Whether both read the same texels, of which they may take different channels.
+    pub(crate) fn reads_as(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.texture, &other.texture)
+            && (self.uv_set, self.transform, self.wrap, self.mode)
+                == (other.uv_set, other.transform, other.wrap, other.mode)
+    }
+
+    /// [`TextureLookup::scalar`] of this and of one that [reads as](TextureLookup::reads_as) it.
+    #[inline]
+    pub(crate) fn scalars(&self, other: &Self, uv: Vec2, footprint: f32) -> [f32; 2] {
+        let value = self.lookup(uv, footprint);
+        [self.pick(value), other.pick(value)]
+    }
+
     fn lookup(&self, uv: Vec2, footprint: f32) -> Vec4 {
         let uv = self.transform.transform_point2(uv);
         match self.mode {
@@ -209,15 +228,29 @@ impl TextureLookup {
     }
 }
 
+/// The largest whole number that is not above it, of a finite one. What every processor has comes without an instruction
+/// for it.
+#[inline]
+pub(crate) fn floor(t: f32) -> f32 {
+    /// From here on all numbers are whole.
+    const WHOLE: f32 = (1 << f32::MANTISSA_DIGITS - 1) as f32;
+    if t.abs() < WHOLE {
+        let cut = t as i32 as f32;
+        if cut > t { cut - 1.0 } else { cut }
+    } else {
+        t
+    }
+}
+
 /// A coordinate brought into [0, 1]. NaN and infinities give 0.
 fn fold(wrap: Wrap, t: f32) -> f32 {
     if !t.is_finite() {
         return 0.0;
     }
     match wrap {
-        Wrap::Repeat => t - t.floor(),
+        Wrap::Repeat => t - floor(t),
         Wrap::Mirror => {
-            let t = t - 2.0 * (t / 2.0).floor();
+            let t = t - 2.0 * floor(t / 2.0);
             if t > 1.0 { 2.0 - t } else { t }
         }
         Wrap::Clamp => t.clamp(0.0, 1.0),
@@ -227,19 +260,41 @@ fn fold(wrap: Wrap, t: f32) -> f32 {
 /// The two texels beside a coordinate, and how far it lies from the first to the second.
 fn neighbours(wrap: Wrap, t: f32, size: u32) -> ([u32; 2], f32) {
     let x = fold(wrap, t) * size as f32 - 0.5;
-    let first = x.floor();
-    let index = |i: i64| {
-        let n = i64::from(size);
-        // Mirrored, the border's neighbour is the border itself, as when clamped.
-        (if wrap == Wrap::Repeat { i.rem_euclid(n) } else { i.clamp(0, n - 1) }) as u32
+    let first = floor(x);
+    let (n, i) = (i64::from(size), first as i64);
+    // From one before the first to one after the last. Mirrored, the border's neighbour is the border itself, as when
+    // clamped.
+    let index = |i: i64| match wrap {
+        Wrap::Repeat if i < 0 => i + n,
+        Wrap::Repeat if i >= n => i - n,
+        _ => i.clamp(0, n - 1),
     };
-    ([index(first as i64), index(first as i64 + 1)], x - first)
+    ([index(i) as u32, index(i + 1) as u32], x - first)
 }
 
+/// All 8-bit values as shares.
+static LINEAR_8: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|i| i as f32 / 255.0));
 /// The sRGB curve for all 8-bit values.
 static SRGB_8: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|i| srgb_to_linear(i as f32 / 255.0)));
 
 impl Level {
+    /// The texels at two columns of two rows.
+    #[inline]
+    fn four(&self, space: ColorSpace, x: [u32; 2], y: [u32; 2]) -> [Vec4; 4] {
+        let Pixels::Rgba8(p) = &self.texels else {
+            return [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| self.texel(space, x[i], y[j]));
+        };
+        // Most images are of bytes: decoded by one table.
+        let (alpha, curve) = (&*LINEAR_8, if space == ColorSpace::Linear { &*LINEAR_8 } else { &*SRGB_8 });
+        let (upper, lower) = (y[0] as usize * self.width as usize, y[1] as usize * self.width as usize);
+        let at = |i: usize| {
+            let [r, g, b, a] = p[i];
+            Vec4::new(curve[usize::from(r)], curve[usize::from(g)], curve[usize::from(b)], alpha[usize::from(a)])
+        };
+        let (left, right) = (x[0] as usize, x[1] as usize);
+        [at(upper + left), at(upper + right), at(lower + left), at(lower + right)]
+    }
+
     fn texel(&self, space: ColorSpace, x: u32, y: u32) -> Vec4 {
         let i = y as usize * self.width as usize + x as usize;
         match &self.texels {
@@ -268,37 +323,75 @@ impl Level {
     fn halved(&self, space: ColorSpace) -> Self {
         let (width, height) = ((self.width / 2).max(1), (self.height / 2).max(1));
         let weigh = |v: Vec4| if space == ColorSpace::SrgbCoverage { (v.xyz() * v.w).extend(v.w) } else { v };
-        let values = (0..height).flat_map(|y| {
-            let rows = cover(y, height, self.height);
-            (0..width).map(move |x| {
-                let columns = cover(x, width, self.width);
-                let (mut sum, mut plain) = (Vec4::ZERO, Vec4::ZERO);
-                for (sy, wy) in &rows {
-                    for (sx, wx) in &columns {
-                        let v = self.texel(space, *sx, *sy);
-                        sum += wx * wy * weigh(v);
-                        plain += wx * wy * v;
-                    }
+        let columns: Vec<_> = (0..width).map(|x| cover(x, width, self.width)).collect();
+        let mean = |rows: &[(u32, f32)], columns: &[(u32, f32)]| {
+            let (mut sum, mut plain) = (Vec4::ZERO, Vec4::ZERO);
+            for (sy, wy) in rows {
+                for (sx, wx) in columns {
+                    let v = self.texel(space, *sx, *sy);
+                    sum += wx * wy * weigh(v);
+                    plain += wx * wy * v;
                 }
-                match space {
-                    ColorSpace::SrgbCoverage if sum.w > 0.0 => (sum.xyz() / sum.w).extend(sum.w),
-                    _ => plain,
-                }
-            })
-        });
-        let encode = |v: Vec4| match space {
-            ColorSpace::Linear => v.to_array(),
-            _ => v.xyz().map(linear_to_srgb).extend(v.w).to_array(),
+            }
+            match space {
+                ColorSpace::SrgbCoverage if sum.w > 0.0 => (sum.xyz() / sum.w).extend(sum.w),
+                _ => plain,
+            }
         };
         let texels = match &self.texels {
-            Pixels::Rgba8(_) => Pixels::Rgba8(values.map(|v| encode(v).map(|x| (x * 255.0 + 0.5) as u8)).collect()),
-            Pixels::Rgba16(_) => {
-                Pixels::Rgba16(values.map(|v| encode(v).map(|x| (x * 65535.0 + 0.5) as u16)).collect())
+            Pixels::Rgba8(_) => {
+                let share = |x: f32| (x * 255.0 + 0.5) as u8;
+                let color = |x: f32| if space == ColorSpace::Linear { share(x) } else { srgb_byte(x) };
+                let encode = |v: Vec4| [color(v.x), color(v.y), color(v.z), share(v.w)];
+                Pixels::Rgba8(self.each(height, &columns, |r, c| encode(mean(r, c))))
             }
-            Pixels::Rgb32F(_) => Pixels::Rgb32F(values.map(|v| v.xyz().to_array()).collect()),
+            Pixels::Rgba16(_) => {
+                let encode = |v: Vec4| match space {
+                    ColorSpace::Linear => v.to_array(),
+                    _ => v.xyz().map(linear_to_srgb).extend(v.w).to_array(),
+                };
+                let words = |v: Vec4| encode(v).map(|x| (x * 65535.0 + 0.5) as u16);
+                Pixels::Rgba16(self.each(height, &columns, |r, c| words(mean(r, c))))
+            }
+            Pixels::Rgb32F(_) => Pixels::Rgb32F(self.each(height, &columns, |r, c| mean(r, c).xyz().to_array())),
         };
         Self { width, height, texels }
     }
+
+    /// The texels of a smaller image, row by row, each by the rows and columns that it covers here.
+    fn each<T: Copy + Default + Send + Sync>(
+        &self,
+        height: u32,
+        columns: &[Vec<(u32, f32)>],
+        texel: impl Fn(&[(u32, f32)], &[(u32, f32)]) -> T + Sync,
+    ) -> Arc<[T]> {
+        let mut texels = vec![T::default(); columns.len() * height as usize];
+        texels.par_chunks_mut(columns.len()).enumerate().for_each(|(y, row)| {
+            let rows = cover(y as u32, height, self.height);
+            for (to, columns) in row.iter_mut().zip(columns) {
+                *to = texel(&rows, columns);
+            }
+        });
+        texels.into()
+    }
+}
+
+/// Where the bytes of the sRGB curve begin: the least linear value of each from 1 on.
+static SRGB_STEPS: LazyLock<[f32; 255]> = LazyLock::new(|| {
+    std::array::from_fn(|i| {
+        let (mut below, mut from) = (0, 1.0f32.to_bits());
+        while from - below > 1 {
+            let middle = below.midpoint(from);
+            let byte = (linear_to_srgb(f32::from_bits(middle)) * 255.0 + 0.5) as usize;
+            if byte > i { from = middle } else { below = middle }
+        }
+        f32::from_bits(from)
+    })
+});
+
+/// A linear value as a byte of the sRGB curve, rounded.
+fn srgb_byte(x: f32) -> u8 {
+    SRGB_STEPS.partition_point(|step| *step <= x) as u8
 }
 
 /// The texels of a row of `from` that the `i`-th of `to` covers, with the shares of it that they fill.
@@ -399,6 +492,24 @@ mod tests {
     }
 
     /// Every level, of whatever size, has the mean of the whole image in linear, but for rounding to its bits.
+    #[test]
+    fn bytes_of_the_srgb_curve_are_rounded() {
+        for i in 0..=4096 {
+            let x = i as f32 / 4096.0;
+            assert_eq!(srgb_byte(x), (linear_to_srgb(x) * 255.0 + 0.5) as u8, "{x}");
+        }
+        for byte in 0..=255 {
+            assert_eq!(srgb_byte(SRGB_8[usize::from(byte)]), byte);
+        }
+    }
+
+    #[test]
+    fn whole_numbers_below_are_those_of_the_library() {
+        for t in [0.0, -0.0, 0.5, -0.5, -1.0, 1.0, 7.99, -7.01, 8_388_607.5, -8_388_607.5, 1e9, -3e12, f32::MAX] {
+            assert_eq!(floor(t), t.floor(), "{t}");
+        }
+    }
+
     #[test]
     fn smaller_copies_keep_the_mean() {
         for (width, height) in [(8, 8), (7, 5), (13, 1), (1, 9), (6, 3)] {

@@ -29,7 +29,7 @@ impl<K: Kernel> Tracer<'_, K> {
         let (x, y) = warp::frame(surface.smooth);
         let direction = x * w.x + y * w.y + surface.smooth * w.z;
         let mut lifted = surface.point;
-        lifted.position += surface.lift;
+        lifted.position += surface.lift();
         let origin = lifted.spawn(surface.geometric.as_dvec3());
         let away = Ray::new(origin, direction.as_dvec3()).with_interval(0.0, reach);
         let covers = sampler.get1(Dimension::Alpha(bounce));

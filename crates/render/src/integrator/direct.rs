@@ -67,7 +67,7 @@ impl<K: Kernel> Lit<'_, K> {
         let reflected = sample.direction.dot(surface.smooth) > 0.0;
         if reflected && terminator {
             let mut lifted = *point;
-            lifted.position += surface.lift;
+            lifted.position += surface.lift();
             // On the viewer's side, even where the light is just below the flat triangle.
             lifted.spawn(surface.geometric.as_dvec3())
         } else {

@@ -81,11 +81,12 @@ struct Vertex<'a, 'b, K: Kernel> {
 }
 
 impl<K: Kernel> Tracer<'_, K> {
-    /// What the camera sees along a ray by one path; `screen` is where in the picture that is, 0 to 1 from the upper
-    /// left.
+    /// What the camera sees along a ray, which meets `first`, by one path; `screen` is where in the picture that is, 0
+    /// to 1 from the upper left.
     pub(crate) fn path(
         &mut self,
         ray: Ray<f64>,
+        first: Option<Hit>,
         cone: Cone,
         screen: [f32; 2],
         sampler: PixelSampler,
@@ -106,21 +107,22 @@ impl<K: Kernel> Tracer<'_, K> {
             scale: 1.0,
             colors: self.colors(sampler),
         };
+        let mut hit = first;
         loop {
-            let hit = self.closest(walk.kind, &walk.ray, walk.source);
             if self.meets_light(&walk, hit.as_ref(), &mut seen) {
                 return seen;
             }
-            let Some(hit) = hit else {
+            let Some(met) = hit else {
                 self.escape_by_path(&walk, screen, limits, &mut seen);
                 return seen;
             };
             if K::THROUGH {
-                walk.throughput *= walk.left_after(hit.t);
+                walk.throughput *= walk.left_after(met.t);
             }
-            if !self.scatter(&mut walk, &hit, sampler, limits, &mut seen) {
+            if !self.scatter(&mut walk, &met, sampler, limits, &mut seen) {
                 return seen;
             }
+            hit = self.closest(walk.kind, &walk.ray, walk.source);
         }
     }
 
@@ -161,14 +163,16 @@ impl<K: Kernel> Tracer<'_, K> {
             };
             seen.color += walk.throughput * background;
         } else if let Some(environment) = &lights.environment {
+            // Only what was asked is asked for its density.
+            let (radiance, pdf) = match &walk.scattered {
+                None => (environment.radiance(direction), 0.0),
+                Some(_) if limits.follow.contains(LobeKind::DIFFUSE) => environment.radiance_and_pdf_bright(direction),
+                Some(_) => (environment.radiance(direction), environment.pdf(direction)),
+            };
             let share = walk.share(|asked| {
-                if limits.follow.contains(LobeKind::DIFFUSE) {
-                    asked.shares.environment * environment.pdf_bright(direction)
-                } else {
-                    environment.pdf(direction)
-                }
+                if limits.follow.contains(LobeKind::DIFFUSE) { asked.shares.environment * pdf } else { pdf }
             });
-            seen.color += walk.throughput * environment.radiance(direction) * share;
+            seen.color += walk.throughput * radiance * share;
         }
     }
 
@@ -184,6 +188,9 @@ impl<K: Kernel> Tracer<'_, K> {
         surface.clock = self.clock;
         let index = stage.world.material(hit.id);
         let material = &stage.materials[index];
+        if K::TEXTURES && stage.flags[index].textured {
+            surface.look();
+        }
 
         if K::FILTERED && material.has_alpha() && walk.layers < MOST_LAYERS {
             let covered = material.coverage::<K>(&surface);
@@ -340,9 +347,12 @@ impl<K: Kernel> Tracer<'_, K> {
                     .mesh
                     .as_ref()
                     .and_then(|mesh| mesh.sample_triangle(i, 1.0 / f64::from(probability), from, u, at.surface.id));
+                let even = lights.area.mesh.as_ref().and_then(|mesh| mesh.even_radiance(i));
                 let sample = sample.map(|(mut sample, hit)| {
-                    let glow = stage.world.attributes(&hit, true);
-                    sample.radiance *= stage.materials[stage.world.material(hit.id)].glow::<K>(&glow);
+                    sample.radiance *= even.unwrap_or_else(|| {
+                        let glow = stage.world.attributes(&hit, true);
+                        stage.materials[stage.world.material(hit.id)].glow::<K>(&glow)
+                    });
                     sample
                 });
                 (sample, RayKind::ShadowArea)
@@ -382,7 +392,7 @@ impl<K: Kernel> Tracer<'_, K> {
         }
         let origin = if before && terminator {
             let mut lifted = surface.point;
-            lifted.position += surface.lift;
+            lifted.position += surface.lift();
             // On the viewer's side, even where the light is just below the flat triangle.
             lifted.spawn(surface.geometric.as_dvec3())
         } else {

@@ -43,8 +43,13 @@ impl Timing {
     }
 
     fn note(&mut self, kind: RayKind, time: Duration) {
-        self.seconds[kind as usize] += time.as_secs_f64();
-        self.rays[kind as usize] += 1;
+        self.note_some(kind, time, 1);
+    }
+
+    /// Some rays that took about this time each.
+    fn note_some(&mut self, kind: RayKind, each: Duration, rays: u64) {
+        self.seconds[kind as usize] += each.as_secs_f64() * rays as f64;
+        self.rays[kind as usize] += rays;
     }
 }
 
@@ -152,13 +157,46 @@ impl<'a, K: Kernel> Tracer<'a, K> {
     pub(crate) fn closest(&mut self, kind: RayKind, ray: &Ray<f64>, source: Option<HitId>) -> Option<Hit> {
         self.timed(kind, |this| {
             let ray = this.clipped(ray)?;
-            if K::FILTERED {
-                this.stage.accel.closest_hit_filtered(&ray, source, |hit| this.is_seen(&ray, hit))
-            } else {
-                // A spawned ray starts off its surface for certain: nothing has to be left out.
-                this.stage.accel.closest_hit(&ray)
-            }
+            // A spawned ray starts off its surface for certain: nothing has to be left out.
+            let hit = this.stage.accel.closest_hit(&ray);
+            if K::FILTERED { this.seen(&ray, source, hit) } else { hit }
         })
+    }
+
+    /// The nearest surfaces that camera rays see, each in the slot of its ray; `timed` of them are.
+    pub(crate) fn camera_hits(&mut self, rays: &[Ray<f64>], hits: &mut [Option<Hit>], timed: u64) -> Duration {
+        let start = Instant::now();
+        let inside: Vec<_>;
+        let rays = match self.clip {
+            None => rays,
+            Some(region) => {
+                // What is outside has an interval without a number in it.
+                let clip = |ray: &Ray<f64>| region.clip(ray).unwrap_or(ray.with_interval(1.0, 0.0));
+                inside = rays.iter().map(clip).collect();
+                &inside
+            }
+        };
+        self.stage.accel.closest_hits(rays, hits);
+        if K::FILTERED {
+            for (ray, hit) in rays.iter().zip(hits) {
+                *hit = self.seen(ray, None, *hit);
+            }
+        }
+        let each = start.elapsed().div_f64(rays.len().max(1) as f64);
+        self.counts[RayKind::Camera] += rays.len() as u64;
+        self.timing.note_some(RayKind::Camera, each, timed);
+        each
+    }
+
+    /// The nearest hit that is seen, when this one is the nearest of all. Most often that is the same, and is found
+    /// without asking about any other.
+    #[inline]
+    fn seen(&self, ray: &Ray<f64>, source: Option<HitId>, nearest: Option<Hit>) -> Option<Hit> {
+        let nearest = nearest?;
+        if source != Some(nearest.id) && self.is_seen(ray, &nearest) {
+            return Some(nearest);
+        }
+        self.stage.accel.closest_hit_filtered(ray, source, |hit| self.is_seen(ray, hit))
     }
 
     /// Whether a surface is there for a ray that sees: glTF hides back faces of single-sided materials, and holes.

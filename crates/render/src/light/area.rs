@@ -198,6 +198,8 @@ struct GlowingTriangle {
     both_sides: bool,
     /// It is a parallelogram: the first corner and the others span it.
     doubled: bool,
+    /// What comes from it, if that is the same everywhere.
+    radiance: Option<Vec3>,
 }
 
 impl GlowingTriangle {
@@ -271,6 +273,12 @@ impl MeshLight {
         self.table.probability(i) * self.pdf_of_triangle(i, direction, distance)
     }
 
+    /// What comes from a triangle, if that is the same everywhere on it.
+    #[inline]
+    pub(crate) fn even_radiance(&self, i: usize) -> Option<Vec3> {
+        self.triangles[i].radiance
+    }
+
     /// The place of a triangle of the scene among the glowing ones.
     #[inline]
     pub(crate) fn index(&self, id: HitId) -> Option<usize> {
@@ -337,8 +345,17 @@ impl AreaLights {
                             // A mirrored mesh keeps its outside: glTF 2.0, section 3.7.4.
                             let side = instance.transform.matrix3.determinant().signum();
                             let normal = cross.normalize_or_zero() * side;
-                            let glow = radiance(id, 1.0 / 3.0, 1.0 / 3.0).max_element();
-                            let triangle = GlowingTriangle { id, corners, normal, area, both_sides, doubled: false };
+                            let light = radiance(id, 1.0 / 3.0, 1.0 / 3.0);
+                            let glow = light.max_element();
+                            let triangle = GlowingTriangle {
+                                id,
+                                corners,
+                                normal,
+                                area,
+                                both_sides,
+                                doubled: false,
+                                radiance: even.then_some(light),
+                            };
                             let last = triangles.len().checked_sub(1).filter(|i| *i >= before && even);
                             let last = last.filter(|i| !triangles[*i].doubled);
                             if let Some((i, both)) = last.and_then(|i| Some((i, triangles[i].doubled(&triangle)?))) {
@@ -504,7 +521,7 @@ mod tests {
             let cross = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
             let id = HitId { instance: 0, geometry: 0, primitive: 0 };
             let (normal, area) = (cross.normalize(), 0.5 * cross.length());
-            GlowingTriangle { id, corners, normal, area, both_sides: false, doubled: false }
+            GlowingTriangle { id, corners, normal, area, both_sides: false, doubled: false, radiance: None }
         };
         let [a, b, c, d] = [DVec3::ZERO, DVec3::X, DVec3::new(1.3, 1.0, 0.0), DVec3::new(0.3, 1.0, 0.0)];
         for (first, second) in [([a, b, c], [a, c, d]), ([b, c, a], [c, d, a]), ([a, b, d], [b, c, d])] {

@@ -7,6 +7,7 @@ use glam::Vec3;
 
 use super::studio;
 use crate::distribution::Distribution2D;
+use crate::texture::floor;
 use crate::warp;
 
 /// Light from all around: its radiance by direction, and how to choose directions in proportion to it.
@@ -164,12 +165,16 @@ impl Environment {
         }
     }
 
-    /// The density, 1/sr, with which [`Environment::sample_bright`] chooses a unit direction.
+    /// [`Environment::radiance`] of a unit direction, and the density, 1/sr, with which [`Environment::sample_bright`]
+    /// chooses it.
     #[inline]
-    pub(crate) fn pdf_bright(&self, direction: Vec3) -> f32 {
+    pub(crate) fn radiance_and_pdf_bright(&self, direction: Vec3) -> (Vec3, f32) {
         match &self.source {
-            Source::Constant => 0.0,
-            Source::Map(map) => map.pdf(map.bright(), self.to_map(direction)),
+            Source::Constant => (self.scale, 0.0),
+            Source::Map(map) => {
+                let uv = self.to_map(direction);
+                (self.scale * map.bilinear(uv), map.pdf(map.bright(), uv))
+            }
         }
     }
 
@@ -198,7 +203,7 @@ impl Environment {
     fn to_map(&self, d: Vec3) -> [f32; 2] {
         let u = d.x.atan2(-d.z) / TAU + self.turn;
         // By atan2, since acos loses half of its digits near the poles.
-        [u, d.x.hypot(d.z).atan2(d.y) / PI]
+        [u, (d.x * d.x + d.z * d.z).sqrt().atan2(d.y) / PI]
     }
 }
 
@@ -224,6 +229,8 @@ struct Map {
     width: usize,
     height: usize,
     pixels: Arc<[[f32; 3]]>,
+    /// The y of the directions at the rows' edges, from the top.
+    edges: Vec<f32>,
     /// Over the texels, by the light that comes through each; `None`: all black.
     distribution: Option<Distribution2D>,
     /// The same for what is brighter than the mean: see [`Environment::sample_bright`]. Made when first asked for.
@@ -235,7 +242,9 @@ impl Map {
     fn new(width: usize, height: usize, pixels: Arc<[[f32; 3]]>) -> Self {
         let pixels = summable(pixels);
         let bright = OnceLock::new();
-        let mut map = Self { width, height, pixels, distribution: None, bright, mean: Vec3::ZERO };
+        let edge = |i: usize| (std::f64::consts::PI * i as f64 / height as f64).cos() as f32;
+        let edges = (0..=height).map(edge).collect();
+        let mut map = Self { width, height, pixels, edges, distribution: None, bright, mean: Vec3::ZERO };
         let mut sum = glam::DVec3::ZERO;
         map.distribution = map.distribution(|mean, solid_angle| {
             sum += (mean * solid_angle).as_dvec3();
@@ -278,7 +287,7 @@ impl Map {
 
     /// The y of the directions at a row's upper and lower edge.
     fn row_cosines(&self, row: usize) -> [f32; 2] {
-        [row, row + 1].map(|edge| (std::f64::consts::PI * edge as f64 / self.height as f64).cos() as f32)
+        [self.edges[row], self.edges[row + 1]]
     }
 
     /// The mean of the interpolated map over a texel: along each axis the texel weighs 3/4 and both neighbours 1/8.
@@ -298,9 +307,12 @@ impl Map {
 
     fn bilinear(&self, [u, v]: [f32; 2]) -> Vec3 {
         let (x, y) = (u * self.width as f32 - 0.5, v * self.height as f32 - 0.5);
-        let (x0, y0) = (x.floor(), y.floor());
+        let (x0, y0) = (floor(x), floor(y));
         let (fx, fy) = (x - x0, y - y0);
-        let columns = [0, 1].map(|i| (x0 as i64 + i).rem_euclid(self.width as i64) as usize);
+        let (width, first) = (self.width as i64, x0 as i64);
+        // Most often it is in the map; a turned map, or a seam, may be looked up beside it.
+        let column = |i: i64| (if (0..width).contains(&i) { i } else { i.rem_euclid(width) }) as usize;
+        let columns = [column(first), column(first + 1)];
         let rows = [0, 1].map(|i| (y0 as i64 + i).clamp(0, self.height as i64 - 1) as usize);
         let along = |row| self.texel(columns[0], row).lerp(self.texel(columns[1], row), fx);
         along(rows[0]).lerp(along(rows[1]), fy)
@@ -318,7 +330,7 @@ impl Map {
 
     fn pdf(&self, distribution: Option<&Distribution2D>, [u, v]: [f32; 2]) -> f32 {
         let Some(distribution) = distribution else { return 0.0 };
-        let column = ((u - u.floor()) * self.width as f32) as usize;
+        let column = ((u - floor(u)) * self.width as f32) as usize;
         let row = (v * self.height as f32) as usize;
         let cell = (column.min(self.width - 1), row.min(self.height - 1));
         distribution.probability(cell) / self.solid_angle(cell.1)

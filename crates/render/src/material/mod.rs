@@ -183,6 +183,11 @@ impl Material {
         matches!(self.model, Model::Layered(_))
     }
 
+    /// Whether it looks textures up. Of layers it is taken for granted.
+    pub(crate) fn is_textured(&self) -> bool {
+        self.pbr().is_some_and(Pbr::is_textured)
+    }
+
     /// Whether its alpha counts.
     pub(crate) fn has_alpha(&self) -> bool {
         self.pbr().is_some_and(Pbr::has_alpha)

@@ -60,6 +60,8 @@ pub(super) struct Pbr {
     layers: Option<Box<Layers>>,
     /// What its rough boundary loses, if it is the boundary of a solid and that is made up for.
     boundary: Option<Arc<Boundary>>,
+    /// One look-up finds both metallic and roughness.
+    one_lookup: bool,
 }
 
 /// What is taken away per unit of length, so that white turns into the attenuation colour over its distance.
@@ -105,7 +107,7 @@ impl Pbr {
         let bends = (desc.ior - 1.0).abs() > 1e-3 && desc.ior.is_finite();
         let solid = desc.thickness > 0.0 && transmission > 0.0;
         let rough_solid = conventions.energy_compensation && solid && rough && bends && !desc.unlit;
-        Ok(Self {
+        let mut pbr = Self {
             base_color: desc.base_color,
             base_color_texture: get(&desc.base_color_texture, ColorSpace::Srgb, textured)?,
             opacity_texture: get(&desc.opacity_texture, ColorSpace::Linear, textured)?,
@@ -137,7 +139,11 @@ impl Pbr {
             dispersion: if has(EffectSet::DISPERSION) { desc.dispersion } else { 0.0 },
             layers,
             boundary: rough_solid.then(|| Arc::new(Boundary::new(desc.ior))),
-        })
+            one_lookup: false,
+        };
+        let (metallic, roughness) = (pbr.metallic_texture.as_ref(), pbr.roughness_texture.as_ref());
+        pbr.one_lookup = metallic.zip(roughness).is_some_and(|(m, r)| m.reads_as(r));
+        Ok(pbr)
     }
 
     pub(super) fn is_solid(&self) -> bool {
@@ -153,6 +159,22 @@ impl Pbr {
     /// Whether it has anything beside its base.
     pub(super) fn is_layered(&self) -> bool {
         self.layers.is_some() && !self.unlit
+    }
+
+    pub(super) fn is_textured(&self) -> bool {
+        let own = [
+            &self.base_color_texture,
+            &self.opacity_texture,
+            &self.metallic_texture,
+            &self.roughness_texture,
+            &self.normal_texture,
+            &self.bump_texture,
+            &self.emissive_texture,
+            &self.transmission_texture,
+            &self.specular_texture,
+            &self.specular_color_texture,
+        ];
+        self.layers.is_some() || own.into_iter().any(Option::is_some)
     }
 
     pub(super) fn has_alpha(&self) -> bool {
@@ -218,6 +240,18 @@ impl Pbr {
         self.emissive * color::<K>(self.emissive_texture.as_ref(), surface).xyz()
     }
 
+    /// glTF keeps both in one image, which is then looked up once.
+    fn metallic_and_roughness<K: Kernel>(&self, surface: &Surface<'_>) -> [f32; 2] {
+        let (metallic, roughness) = (self.metallic_texture.as_ref(), self.roughness_texture.as_ref());
+        let shares = match (metallic, roughness) {
+            (Some(m), Some(r)) if K::TEXTURES && self.one_lookup => {
+                surface.timed(|| m.scalars(r, surface.uv(m.uv_set()), surface.footprint(m.uv_set())))
+            }
+            _ => [scalar::<K>(metallic, surface), scalar::<K>(roughness, surface)],
+        };
+        [(self.metallic * shares[0]).clamp(0.0, 1.0), (self.roughness * shares[1]).clamp(0.0, 1.0)]
+    }
+
     fn fresnel<K: Kernel>(&self, surface: &Surface<'_>, base: Vec3, metallic: f32, eta: f32) -> Fresnel {
         let specular = self.specular * scalar::<K>(self.specular_texture.as_ref(), surface);
         let tint = self.specular_color * color::<K>(self.specular_color_texture.as_ref(), surface).xyz();
@@ -242,8 +276,7 @@ impl Pbr {
         if !conventions.reference {
             normal = surface.bent(normal);
         }
-        let metallic = (self.metallic * scalar::<K>(self.metallic_texture.as_ref(), surface)).clamp(0.0, 1.0);
-        let roughness = (self.roughness * scalar::<K>(self.roughness_texture.as_ref(), surface)).clamp(0.0, 1.0);
+        let [metallic, roughness] = self.metallic_and_roughness::<K>(surface);
         let transmission = match K::THROUGH {
             true => (self.transmission * scalar::<K>(self.transmission_texture.as_ref(), surface)).clamp(0.0, 1.0),
             false => 0.0,
