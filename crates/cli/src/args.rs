@@ -16,7 +16,7 @@ use glam::DVec3;
 use crate::accuracy::AccuracyArgs;
 use crate::bench::BenchArgs;
 use crate::compare::CompareArgs;
-use crate::values::{self, AovList, Color, Hdri, Plane, Resolution, Switch};
+use crate::values::{self, AovList, Color, Explain, Hdri, Plane, Resolution, Switch};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -172,7 +172,7 @@ pub(crate) struct QualityArgs {
     #[arg(long, value_name = "TIME", value_parser = values::time)]
     pub(crate) time_limit: Option<Duration>,
 
-    /// Keep all that has been summed in this file: every minute, on Ctrl-C, at the time limit and at the end
+    /// Keep all that has been summed in this file: more than once a minute, on Ctrl-C, at the time limit and at the end
     #[arg(long, value_name = "FILE")]
     pub(crate) checkpoint: Option<PathBuf>,
 
@@ -321,9 +321,11 @@ pub(crate) struct RunArgs {
     #[arg(long)]
     pub(crate) strict: bool,
 
-    /// Say what was chosen and why, and what each effect cost
-    #[arg(long)]
-    pub(crate) explain: bool,
+    /// Say what was chosen and why, and what each effect cost; `ablate`: also how much the image changes without each,
+    /// from small renders
+    #[arg(long, value_name = "WHAT", num_args = 0..=1, require_equals = true, default_value = "nothing",
+          default_missing_value = "costs", value_parser = values::explain, hide_default_value = true)]
+    pub(crate) explain: Explain,
 
     /// Print a report of the render as JSON on standard output
     #[arg(long)]

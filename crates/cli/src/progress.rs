@@ -55,8 +55,8 @@ pub(crate) struct Keep {
     last: Mutex<Instant>,
 }
 
-/// So often.
-const KEEP: Duration = Duration::from_secs(60);
+/// So often. What rows take that are begun, and writing the file, comes on top: together less than a minute.
+const KEEP: Duration = Duration::from_secs(45);
 
 impl Keep {
     pub(crate) fn new(path: PathBuf, picture: String) -> Self {

@@ -10,8 +10,8 @@ use firsthit_accel::{BuildOptions, SceneBuilder};
 use firsthit_import::scene::Settings;
 use firsthit_import::{Imported, Report};
 use firsthit_render::{
-    Aov, Background, CameraChanges, Clip, EnvironmentChoice, IntegratorChoice, RenderOptions, Rendered, Stage,
-    StageOptions, View, ViewTransform,
+    AblateError, AblateOptions, Aov, Background, CameraChanges, Clip, EnvironmentChoice, IntegratorChoice,
+    RenderOptions, Rendered, Stage, StageOptions, View, ViewTransform, ablate,
     output::{BitDepth, WriteOptions, write_checkpoint, write_film, write_png},
 };
 
@@ -22,10 +22,10 @@ use crate::hdri;
 use crate::interrupt::Interrupt;
 use crate::merge;
 use crate::progress::{Keep, Progress, Style, duration};
-use crate::report::{Counts, RenderReport, Seconds, effects, explain_effects, rays_in_words, warnings};
+use crate::report::{Ablation, Counts, RenderReport, Seconds, effects, explain_effects, rays_in_words, warnings};
 use crate::simd;
 use crate::target::{Target, writable};
-use crate::values::{Hdri, Resolution, Switch};
+use crate::values::{Explain, Hdri, Resolution, Switch};
 
 /// Renders a model as the arguments say.
 pub(crate) fn run(args: &RenderArgs, config: Option<&Path>) -> Result<Exit, Failure> {
@@ -101,7 +101,7 @@ impl Job<'_> {
         let counts = Counts::new(&scene);
         let stage = Stage::new(Arc::new(scene), trees, &stage_options).map_err(|e| self.at_model(&e))?;
         seconds.build = started.elapsed().as_secs_f64();
-        if args.run.explain {
+        if args.run.explain >= Explain::Costs {
             stage.explain().iter().for_each(message);
         } else {
             stage.explain().iter().for_each(|line| self.console.detail(line));
@@ -136,8 +136,14 @@ impl Job<'_> {
         };
         seconds.write = started.elapsed().as_secs_f64();
 
-        if args.run.explain {
-            explain_effects(&rendered.effects).iter().for_each(message);
+        let ablation = match args.run.explain {
+            Explain::Ablations if !rendered.interrupted => self.ablate(&stage, &stage_options, &options)?,
+            _ => None,
+        };
+        if args.run.explain >= Explain::Costs {
+            let processor = rendered.stats.seconds * rayon::current_num_threads() as f64;
+            explain_effects(&rendered.effects, stage.kernel().name(), processor).iter().for_each(message);
+            ablation.iter().flat_map(Ablation::lines).for_each(message);
         }
         self.console.say(self.summary(&rendered, counts, seconds));
         if args.run.json {
@@ -164,6 +170,8 @@ impl Job<'_> {
                 bad_samples: rendered.stats.bad_samples,
                 interrupted: rendered.interrupted,
                 effects: effects(&rendered.effects),
+                kernel: stage.kernel().name(),
+                ablation,
                 choices: stage.explain(),
                 warnings: warnings(&report),
                 more_warnings: report.more_warnings,
@@ -173,6 +181,25 @@ impl Job<'_> {
         // The picture is there to be looked at, whatever is said about it.
         self.console.bad_samples(rendered.stats.bad_samples, args.run.strict)?;
         Ok(if rendered.interrupted { Exit::Interrupted } else { Exit::Done })
+    }
+
+    /// Renders small pictures without each effect. `None` if the user has enough of it: the image is there already.
+    fn ablate(
+        &self,
+        stage: &Stage,
+        setup: &StageOptions,
+        options: &RenderOptions,
+    ) -> Result<Option<Ablation>, Failure> {
+        let run = &self.args.run;
+        let style = Style::new(run.progress, run.no_progress, run.quiet);
+        let progress = Progress::new(style, "ablating", self.interrupt.clone());
+        let ablations = ablate(stage, setup, options, &AblateOptions::default(), &progress);
+        progress.finish();
+        match ablations {
+            Ok(ablations) => Ok(Some(Ablation::from(&ablations))),
+            Err(AblateError::Cancelled) => Ok(None),
+            Err(error) => Err(self.at_model(&error)),
+        }
     }
 
     /// What decides the samples of a picture, in words: the program, the files by name and content, and the options but

@@ -5,7 +5,7 @@ use std::fmt;
 
 use firsthit_import::scene::SurfaceDesc;
 use firsthit_import::{Report, SceneDesc};
-use firsthit_render::{EffectEntry, EffectPlan, RayCounts};
+use firsthit_render::{Ablations, EffectEntry, EffectPlan, RayCounts};
 use serde::Serialize;
 
 use crate::console::{count, short};
@@ -42,6 +42,11 @@ pub(crate) struct RenderReport<'a> {
     pub(crate) bad_samples: u64,
     pub(crate) interrupted: bool,
     pub(crate) effects: Vec<Effect<'a>>,
+    /// The kernel that was chosen for them.
+    pub(crate) kernel: &'static str,
+    /// What the picture is without each effect; absent unless asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) ablation: Option<Ablation>,
     /// Which camera, light and background were chosen, and why.
     pub(crate) choices: &'a [String],
     pub(crate) warnings: Vec<String>,
@@ -104,6 +109,12 @@ pub(crate) struct Effect<'a> {
     /// Rays cast for it alone; absent before rendering.
     #[serde(skip_serializing_if = "Option::is_none")]
     rays: Option<u64>,
+    /// How often it was evaluated at a point, or a light of its kind was asked; absent where rays tell.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    samples: Option<u64>,
+    /// Look-ups of images for it; absent where there are none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    look_ups: Option<u64>,
     /// Processor seconds in those rays; absent where they were not measured apart.
     #[serde(skip_serializing_if = "Option::is_none")]
     seconds: Option<f64>,
@@ -122,6 +133,8 @@ impl<'a> From<&'a EffectEntry> for Effect<'a> {
             by: &e.by,
             simulated: e.simulated,
             rays: e.rays,
+            samples: e.samples,
+            look_ups: e.look_ups,
             seconds: e.seconds,
         }
     }
@@ -139,8 +152,9 @@ impl Effect<'_> {
     }
 }
 
-/// The plan as lines: each effect, who calls for it, whether it is simulated, and what it cost.
-pub(crate) fn explain_effects(plan: &EffectPlan) -> Vec<String> {
+/// The plan as lines: each effect, who calls for it, whether it is simulated, and what it cost of the processor `seconds` of
+/// the render.
+pub(crate) fn explain_effects(plan: &EffectPlan, kernel: &str, seconds: f64) -> Vec<String> {
     let line = |e: &Effect<'_>| {
         let (verdict, by) = match (e.called_for, e.simulated) {
             (true, true) => ("yes", e.by_in_words()),
@@ -148,14 +162,87 @@ pub(crate) fn explain_effects(plan: &EffectPlan) -> Vec<String> {
             (false, true) => ("added", "by --effects".into()),
             (false, false) => ("no", "not called for".into()),
         };
-        let cost = match (e.rays, e.seconds) {
-            (Some(0) | None, _) => String::new(),
-            (Some(n), None) => format!("; {} rays", short(n as f64)),
-            (Some(n), Some(s)) => format!("; {} rays, {s:.2} s", short(n as f64)),
-        };
-        format!("  {:18} {verdict:8} {by}{cost}", e.name)
+        let counts = [(e.rays, "rays"), (e.samples, "samples"), (e.look_ups, "look-ups")];
+        let mut costs: Vec<String> = counts
+            .iter()
+            .filter_map(|(n, what)| Some(format!("{} {what}", short(n.filter(|n| *n > 0)? as f64))))
+            .collect();
+        if let (Some(s), true) = (e.seconds, e.rays.is_some_and(|n| n > 0)) {
+            costs.push(format!("{s:.2} s in rays ({:.0} %)", 100.0 * s / seconds));
+        }
+        let cost = if costs.is_empty() { String::new() } else { format!("; {}", costs.join(", ")) };
+        format!("  {:20} {verdict:8} {by}{cost}", e.name)
     };
-    std::iter::once("effects:".into()).chain(effects(plan).iter().map(line)).collect()
+    [format!("kernel: {kernel}"), "effects:".into()].into_iter().chain(effects(plan).iter().map(line)).collect()
+}
+
+/// What the picture is without each effect.
+#[derive(Serialize)]
+pub(crate) struct Ablation {
+    width: u32,
+    height: u32,
+    spp: u32,
+    repetitions: u32,
+    /// With all effects.
+    seconds: f64,
+    /// How much other random numbers change the picture.
+    noise: f64,
+    effects: Vec<Ablated>,
+}
+
+#[derive(Serialize)]
+struct Ablated {
+    name: &'static str,
+    rmse: f64,
+    /// `rmse` over the root mean square of the whole picture; `null` of a black one.
+    relative: Option<f64>,
+    /// Without it.
+    seconds: f64,
+    /// Seconds with all effects less those without it.
+    saved: f64,
+}
+
+impl From<&Ablations> for Ablation {
+    fn from(a: &Ablations) -> Self {
+        let effect = |e: &firsthit_render::Ablation| Ablated {
+            name: e.name,
+            rmse: e.rmse,
+            relative: Some(e.relative).filter(|r| r.is_finite()),
+            seconds: e.seconds,
+            saved: e.saved,
+        };
+        Self {
+            width: a.width,
+            height: a.height,
+            spp: a.spp,
+            repetitions: a.repetitions,
+            seconds: a.seconds,
+            noise: a.noise,
+            effects: a.effects.iter().map(effect).collect(),
+        }
+    }
+}
+
+impl Ablation {
+    /// As a table: what changes the picture most comes first.
+    pub(crate) fn lines(&self) -> Vec<String> {
+        let mut lines = vec![
+            format!(
+                "without each effect in turn ({}x{}, {} samples per pixel, {:.2} s with all; median of {}):",
+                self.width, self.height, self.spp, self.seconds, self.repetitions
+            ),
+            format!("  {:20} {:>10} {:>10} {:>9} {:>7}", "without", "rmse", "relative", "saves", "of all"),
+        ];
+        let mut effects: Vec<&Ablated> = self.effects.iter().collect();
+        effects.sort_by(|a, b| b.rmse.total_cmp(&a.rmse));
+        lines.extend(effects.iter().map(|e| {
+            let relative = e.relative.map_or_else(|| "-".into(), |r| format!("{:.2} %", 100.0 * r));
+            let share = 100.0 * e.saved / self.seconds;
+            format!("  {:20} {:>10.5} {relative:>10} {:>7.3} s {share:>5.0} %", e.name, e.rmse, e.saved)
+        }));
+        lines.push(format!("  other random numbers alone: rmse {:.5}", self.noise));
+        lines
+    }
 }
 
 /// Rays by kind, without the kinds that were not cast.

@@ -165,6 +165,26 @@ pub(crate) enum Switch {
     Off,
 }
 
+/// What is explained of a render.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Explain {
+    Nothing,
+    /// What was chosen, and what each effect cost.
+    Costs,
+    /// And what the image would be without each effect.
+    Ablations,
+}
+
+/// `costs` or `ablate`; configuration files may say `true` or `false`.
+pub(crate) fn explain(s: &str) -> Result<Explain, String> {
+    match s {
+        "nothing" | "false" => Ok(Explain::Nothing),
+        "costs" | "true" => Ok(Explain::Costs),
+        "ablate" => Ok(Explain::Ablations),
+        _ => Err("expected costs or ablate".into()),
+    }
+}
+
 pub(crate) fn switch(s: &str) -> Result<Switch, String> {
     match s {
         "on" => Ok(Switch::On),

@@ -423,10 +423,35 @@ fn explain_says_what_was_chosen_and_what_each_effect_cost() {
     let folder = Folder::new();
     let run = folder.render(&["--explain"]).code(0);
     let text = run.stderr();
-    for word in ["effects:", "shadows", "refraction", "not called for", "rays"] {
+    for word in ["effects:", "shadows", "refraction", "not called for", "rays", "kernel: ", "samples"] {
         assert!(text.contains(word), "no '{word}' in {text}");
     }
     assert_eq!(run.stdout(), "");
+}
+
+#[test]
+fn ablations_say_what_the_image_would_be_without_each_effect() {
+    let folder = Folder::new();
+    let run = folder.render(&["--explain=ablate", "--json", "--effects", "auto,-reflection,+ao"]).code(0);
+    let text = run.stderr();
+    for word in ["without each effect in turn", "rmse", "saves", "other random numbers"] {
+        assert!(text.contains(word), "no '{word}' in {text}");
+    }
+    let json = run.json();
+    let simulated = json["effects"].as_array().unwrap().iter().filter(|e| e["simulated"] == true);
+    let simulated: Vec<_> = simulated.map(|e| e["name"].as_str().unwrap().to_owned()).collect();
+    let ablated = json["ablation"]["effects"].as_array().unwrap();
+    let names: Vec<_> = ablated.iter().map(|e| e["name"].as_str().unwrap().to_owned()).collect();
+    assert_eq!(names, simulated);
+    assert!(!names.iter().any(|n| n == "reflection"));
+    let of = |name: &str| ablated.iter().find(|e| e["name"] == name).unwrap()["rmse"].as_f64().unwrap();
+    // Path tracing has no use for ambient occlusion; without its surroundings the scene is black.
+    assert_eq!(of("ambient-occlusion"), 0.0);
+    assert!(of("environment") > 0.01);
+    assert!(ablated.iter().all(|e| e["seconds"].as_f64().unwrap() > 0.0));
+    folder.render(&["--explain=everything"]).fails(2, &["costs or ablate"]);
+    folder.write("firsthit.toml", "explain = true\n");
+    assert!(folder.render(&[]).code(0).stderr().contains("effects:"));
 }
 
 #[test]

@@ -66,6 +66,12 @@ const MAGIC: &[u8; 16] = b"firsthit film 2\n";
 const MOST_WORDS: u32 = 1 << 20;
 
 impl Sums<'_> {
+    /// The picture so far.
+    #[must_use]
+    pub fn film(&self) -> &Film {
+        self.film
+    }
+
     /// Writes it, with words that say which picture it is of.
     ///
     /// # Errors

@@ -2,6 +2,7 @@
 
 use bitflags::bitflags;
 
+use crate::tally::Tally;
 use crate::{RayCounts, RayKind};
 
 bitflags! {
@@ -121,6 +122,11 @@ pub struct EffectEntry {
     pub simulated: bool,
     /// Rays cast for it; `None` before rendering, and for effects that cast none of their own.
     pub rays: Option<u64>,
+    /// How often it was evaluated at a point, or a light of its kind was asked; `None` before rendering, and for effects
+    /// that their rays alone tell of.
+    pub samples: Option<u64>,
+    /// Look-ups of images for it; `None` before rendering, and for effects that have none.
+    pub look_ups: Option<u64>,
     /// Processor seconds (summed over threads) in its rays, extrapolated from a sample of timed pixels; `None` as for
     /// `rays`.
     pub seconds: Option<f64>,
@@ -142,6 +148,8 @@ impl Default for EffectPlan {
             by: Vec::new(),
             simulated: false,
             rays: None,
+            samples: None,
+            look_ups: None,
             seconds: None,
         };
         Self { entries: EffectSet::NAMES.iter().map(entry).collect() }
@@ -196,9 +204,16 @@ impl EffectPlan {
     }
 
     /// The plan with what the effects cost.
-    pub(crate) fn with_costs(&self, rays: &RayCounts, seconds_per_ray: impl Fn(RayKind) -> Option<f64>) -> Self {
+    pub(crate) fn with_costs(
+        &self,
+        rays: &RayCounts,
+        tally: &Tally,
+        seconds_per_ray: impl Fn(RayKind) -> Option<f64>,
+    ) -> Self {
         let mut plan = self.clone();
         for entry in &mut plan.entries {
+            entry.samples = tally.samples(entry.effect);
+            entry.look_ups = tally.look_ups(entry.effect);
             let kinds = kinds_of(entry.effect);
             if kinds.is_empty() {
                 continue;

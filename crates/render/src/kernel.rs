@@ -27,7 +27,7 @@ pub(crate) trait Kernel: Copy + fmt::Debug + Send + Sync + 'static {
 }
 
 /// The most lobes of a surface: diffuse, reflection, transmission, diffuse transmission, sheen, coat.
-pub(crate) const MAX_LOBES: usize = 6;
+pub(crate) const MAX_LOBES: usize = if cfg!(feature = "without-layers") { 3 } else { 6 };
 
 macro_rules! kernels {
     ($($(#[$doc:meta])* $name:ident: $textures:literal, $filtered:literal, $through:literal, $layers:literal, $lobes:expr;)*) => {$(
@@ -39,7 +39,7 @@ macro_rules! kernels {
             const TEXTURES: bool = $textures;
             const FILTERED: bool = $filtered;
             const THROUGH: bool = $through;
-            const LAYERS: bool = $layers;
+            const LAYERS: bool = $layers && cfg!(not(feature = "without-layers"));
             type Lobes = [Lobe; $lobes];
             const NO_LOBES: Self::Lobes = [Lobe::Nothing; $lobes];
         }

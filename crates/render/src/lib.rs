@@ -1,5 +1,6 @@
 //! From a scene to a picture: effects, materials, lights, cameras, integrators, film and output.
 
+mod ablate;
 mod aov;
 pub mod camera;
 mod checkpoint;
@@ -23,10 +24,12 @@ mod stage;
 mod stats;
 mod surface;
 mod survey;
+mod tally;
 pub mod texture;
 pub mod view;
 pub mod warp;
 
+pub use ablate::{AblateError, AblateOptions, Ablation, Ablations, ablate};
 pub use aov::Aov;
 pub use camera::{Camera, CameraError};
 pub use checkpoint::{Checkpoint, CheckpointError, CheckpointReader, Sums};

@@ -11,7 +11,8 @@ pub trait Monitor: Sync {
         let _ = (done, total, rays);
     }
 
-    /// Whether [`Monitor::checkpoint`] is to be called now. Asked after each pass, and within long ones.
+    /// Whether [`Monitor::checkpoint`] is to be called now: it is, once each thread has finished the row of pixels that it is
+    /// at. Asked before each row.
     fn wants_checkpoint(&self) -> bool {
         false
     }

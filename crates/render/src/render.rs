@@ -1,6 +1,6 @@
 //! The driver: a stage, options, and a picture as the answer.
 
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use firsthit_accel::{Hit, TraversalCounts};
@@ -20,6 +20,7 @@ use crate::kernel::{Clear, Filtered, Full, Kernel, Plain, Textured, TexturedFilt
 use crate::material::lobes::LobeKind;
 use crate::noise::Tiles;
 use crate::sampler::{Dimension, PixelSampler};
+use crate::tally::Tally;
 use crate::{
     Aov, Checkpoint, Clip, EffectPlan, EffectSet, Film, FilterChoice, IntegratorChoice, KernelChoice, Monitor,
     RayCounts, RenderOptions, RenderStats, Stage, Sums,
@@ -129,8 +130,6 @@ impl Rendered {
 const MOST_BOUNCES: u32 = 1024;
 /// Rows of a band, the unit of work of a thread.
 const BAND: u32 = 4;
-/// Between so many bands a checkpoint may be made.
-const AT_ONCE: usize = 64;
 /// Of so many pixels one is timed; with [`RenderOptions::profile`] more.
 const TIMED: u32 = 61;
 const PROFILED: u32 = 7;
@@ -221,7 +220,7 @@ fn render_watched(
     if matches!(job.method, Method::Occlusion(_)) {
         plan.ask(EffectSet::AMBIENT_OCCLUSION, "the integrator");
     }
-    let effects = plan.with_costs(&done.rays, |kind| done.timing.seconds_per_ray(kind));
+    let effects = plan.with_costs(&done.rays, &done.tally, |kind| done.timing.seconds_per_ray(kind));
     let stats = RenderStats {
         rays: done.rays,
         samples: done.samples,
@@ -267,20 +266,25 @@ enum End {
 #[derive(Clone, Copy, Debug, Default)]
 struct Done {
     rays: RayCounts,
+    tally: Tally,
     timing: Timing,
     samples: u64,
     bad: u64,
     /// Whether something was left out because time was up.
     late: bool,
+    /// Whether something was left for later, so that a checkpoint can be made.
+    paused: bool,
 }
 
 impl Done {
     fn and(mut self, other: Self) -> Self {
         self.rays += other.rays;
+        self.tally += other.tally;
         self.timing.add(&other.timing);
         self.samples += other.samples;
         self.bad += other.bad;
         self.late |= other.late;
+        self.paused |= other.paused;
         self
     }
 }
@@ -405,28 +409,36 @@ impl<'a> Job<'a> {
             let first = rest.pass;
             let last = next_pass(first).min(self.options.spp);
             let mut whole = true;
-            for some in (0..bands as usize).step_by(AT_ONCE) {
-                let pass = film
+            let complete: Vec<AtomicBool> = (0..bands).map(|_| AtomicBool::new(false)).collect();
+            // Once, or with pauses for checkpoints.
+            loop {
+                let part = film
                     .par_bands_mut(BAND)
-                    .skip(some)
-                    .take(AT_ONCE)
-                    .map(|mut band| {
+                    .zip(&complete)
+                    .filter(|(_, complete)| !complete.load(Ordering::Relaxed))
+                    .map(|(mut band, complete)| {
                         let clock = Clock::default();
                         let mut tracer = Tracer::<K>::new(self.stage, &self.clip);
                         let band_done = self.band(&mut tracer, &clock, &mut band, first..last, tiles, monitor);
-                        let finished = finished.fetch_add(u64::from(last - first), Ordering::Relaxed);
+                        complete.store(!band_done.paused, Ordering::Relaxed);
+                        let new = if band_done.paused { 0 } else { u64::from(last - first) };
+                        let finished = finished.fetch_add(new, Ordering::Relaxed) + new;
                         let rays = rays.fetch_add(band_done.rays.total(), Ordering::Relaxed) + band_done.rays.total();
-                        monitor.progress(finished + u64::from(last - first), total, rays);
+                        monitor.progress(finished, total, rays);
                         band_done
                     })
                     .reduce(Done::default, Done::and);
-                whole &= !pass.late;
-                done = done.and(pass);
+                whole &= !part.late;
+                let paused = part.paused;
+                done = done.and(Done { paused: false, ..part });
                 if monitor.cancelled() {
                     return (done, End::Cancelled);
                 }
                 if monitor.wants_checkpoint() {
                     monitor.checkpoint(&Sums { film, rest });
+                }
+                if !paused {
+                    break;
                 }
             }
             if !whole {
@@ -458,9 +470,13 @@ impl<'a> Job<'a> {
     ) -> Done {
         let mut done = Done::default();
         let mut shots = Shots::default();
+        // What was done before on this thread is of others.
+        let _ = Tally::take();
         for y in band.rows() {
             done.late = self.is_late(samples.start);
-            if done.late || monitor.cancelled() {
+            // A row at least is done between two checkpoints, however often they are wanted.
+            done.paused = done.samples > 0 && monitor.wants_checkpoint();
+            if done.late || done.paused || monitor.cancelled() {
                 break;
             }
             for x in band.columns() {
@@ -487,6 +503,7 @@ impl<'a> Job<'a> {
         }
         done.bad += self.shoot(tracer, clock, band, &mut shots);
         done.rays = tracer.counts;
+        done.tally = Tally::take();
         done.timing = tracer.timing;
         done.timing.parts.add(&clock.parts());
         done

@@ -170,6 +170,9 @@ impl Stage {
             explain.push("light: a little even light was added for what surfaces send to each other".into());
         }
         plan.decide(&options.effects);
+        if cfg!(feature = "without-layers") {
+            plan.leave(EffectSet::LAYERS);
+        }
         let effects = plan.simulated();
 
         let energy_compensation = options.energy_compensation && !reference;

@@ -10,6 +10,7 @@ use glam::{DAffine3, DMat3, DVec3, Mat3, Vec2, Vec3, Vec4};
 
 use crate::integrator::clock::Clock;
 use crate::material::Colors;
+use crate::{EffectSet, tally};
 
 /// The scene's geometry with what shading needs beside the trees.
 #[derive(Clone, Debug)]
@@ -184,12 +185,19 @@ pub(crate) struct Surface<'a> {
 }
 
 impl Surface<'_> {
-    /// A look-up of a texture here, timed if that is asked for.
+    /// A look-up of a texture here, counted, and timed if that is asked for.
     #[inline]
-    pub(crate) fn timed<R>(&self, look_up: impl FnOnce() -> R) -> R {
+    pub(crate) fn look_up<R>(&self, look_up: impl FnOnce() -> R) -> R {
+        tally::look_up(EffectSet::TEXTURES);
+        self.timed(look_up)
+    }
+
+    /// Work for textures, timed if that is asked for.
+    #[inline]
+    fn timed<R>(&self, work: impl FnOnce() -> R) -> R {
         match self.clock {
-            None => look_up(),
-            Some(clock) => clock.texturing(look_up),
+            None => work(),
+            Some(clock) => clock.texturing(work),
         }
     }
 
@@ -224,6 +232,7 @@ impl Surface<'_> {
     pub(crate) fn color(&self) -> Vec4 {
         match self.part {
             Part::Triangle { mesh, corners, weights } if !mesh.colors.is_empty() => {
+                tally::sample(EffectSet::VERTEX_COLORS);
                 (0..3).map(|i| mesh.colors[corners[i]] * weights[i]).sum()
             }
             _ => Vec4::ONE,

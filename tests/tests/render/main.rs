@@ -2,6 +2,7 @@
 
 mod both_ways;
 mod common;
+mod effects;
 mod layers;
 mod path;
 mod references;

@@ -409,3 +409,49 @@ fn pauses_and_shares_leave_no_trace() {
     assert!(render_from(&stage, &other, Some(joined), &()).is_err(), "another picture");
     assert!(render(&stage, &RenderOptions { first_sample: 8, ..options }, &()).is_err(), "not at a block");
 }
+
+/// A checkpoint is made within a row of pixels of being wanted, however long a pass is, and any of them can be gone on with.
+#[test]
+fn a_checkpoint_loses_no_more_than_the_rows_at_hand() {
+    use std::sync::Mutex;
+
+    /// Wants a checkpoint all the time, and keeps some.
+    #[derive(Default)]
+    struct Eager(Mutex<(Vec<u64>, Vec<Vec<u8>>)>);
+    impl Monitor for Eager {
+        fn wants_checkpoint(&self) -> bool {
+            true
+        }
+        fn checkpoint(&self, sums: &firsthit_render::Sums<'_>) {
+            let (counts, kept) = &mut *self.0.lock().unwrap();
+            counts.push((sums.film().samples_per_pixel() * 48.0 * 32.0).round() as u64);
+            if counts.len() % 7 == 3 {
+                let mut bytes = Vec::new();
+                sums.write(&mut bytes, "").unwrap();
+                kept.push(bytes);
+            }
+        }
+    }
+    let scene = std::sync::Arc::new(everything());
+    let stage = common::stage(&scene, &StageOptions::default());
+    let options = small(40);
+    let plain = render(&stage, &options, &()).unwrap();
+    let eager = Eager::default();
+    let watched = render(&stage, &options, &eager).unwrap();
+    assert_eq!(watched.film, plain.film);
+    assert_eq!(watched.stats.rays, plain.stats.rays);
+    assert_eq!(watched.stats.samples, plain.stats.samples);
+    let (counts, kept) = eager.0.into_inner().unwrap();
+    let mut before = 0;
+    for count in &counts {
+        // One row of each of the eight bands, 16 samples a pixel.
+        assert!(count - before <= 8 * 48 * 16, "{before} to {count}");
+        before = *count;
+    }
+    assert_eq!(before, plain.stats.samples);
+    assert!(kept.len() >= 2);
+    for bytes in kept {
+        let (start, _) = Checkpoint::read(&mut bytes.as_slice()).unwrap();
+        assert_eq!(render_from(&stage, &options, Some(start), &()).unwrap().film, plain.film);
+    }
+}

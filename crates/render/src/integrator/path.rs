@@ -17,6 +17,7 @@ use glam::Vec3;
 use super::scatter::{Scatter, Towards, family, is_delta};
 use super::whitted::{Limits, Seen};
 use super::{Tracer, aov};
+use crate::EffectSet;
 use crate::RayKind;
 use crate::camera::Cone;
 use crate::kernel::Kernel;
@@ -28,6 +29,7 @@ use crate::material::{Bsdf, Colors, Material};
 use crate::sampler::{Dimension, PixelSampler};
 use crate::stage::Backdrop;
 use crate::surface::Surface;
+use crate::tally;
 
 /// After this bounce chance ends paths that have become dim.
 const ROULETTE: u32 = 2;
@@ -455,6 +457,7 @@ impl Walk {
         if self.absorption == Vec3::ZERO {
             return Vec3::ONE;
         }
+        tally::sample(EffectSet::ABSORPTION);
         let way = t * self.ray.direction.length();
         (self.absorption * -(way as f32)).map(f32::exp)
     }

@@ -13,7 +13,7 @@ use crate::kernel::Kernel;
 use crate::light::{LightEnd, LightSample};
 use crate::material::Colors;
 use crate::sampler::{Dimension, PixelSampler};
-use crate::{EffectSet, RayCounts, RayKind, Stage};
+use crate::{EffectSet, RayCounts, RayKind, Stage, tally};
 
 /// Time spent in rays of each kind, on pixels that are timed.
 #[derive(Clone, Copy, Debug, Default)]
@@ -113,7 +113,11 @@ impl<'a, K: Kernel> Tracer<'a, K> {
 
     /// Which colour a camera ray's path follows once colours are parted; nothing is drawn where they never are.
     pub(super) fn colors(&self, sampler: PixelSampler) -> Colors {
-        if self.disperses { Colors::chosen_by(sampler.get1(Dimension::Color)) } else { Colors::All(1) }
+        if !self.disperses {
+            return Colors::All(1);
+        }
+        tally::sample(EffectSet::DISPERSION);
+        Colors::chosen_by(sampler.get1(Dimension::Color))
     }
 
     /// Sample points for one use.
@@ -138,7 +142,10 @@ impl<'a, K: Kernel> Tracer<'a, K> {
     fn clipped(&self, ray: &Ray<f64>) -> Option<Ray<f64>> {
         match self.clip {
             None => Some(*ray),
-            Some(region) => region.clip(ray),
+            Some(region) => {
+                tally::sample(EffectSet::CLIPPING);
+                region.clip(ray)
+            }
         }
     }
 
@@ -171,7 +178,10 @@ impl<'a, K: Kernel> Tracer<'a, K> {
             None => rays,
             Some(region) => {
                 // What is outside has an interval without a number in it.
-                let clip = |ray: &Ray<f64>| region.clip(ray).unwrap_or(ray.with_interval(1.0, 0.0));
+                let clip = |ray: &Ray<f64>| {
+                    tally::sample(EffectSet::CLIPPING);
+                    region.clip(ray).unwrap_or(ray.with_interval(1.0, 0.0))
+                };
                 inside = rays.iter().map(clip).collect();
                 &inside
             }

@@ -14,6 +14,7 @@ use glam::{DVec3, Vec3};
 
 use super::direct::{Lit, is_followed};
 use super::{Tracer, aov};
+use crate::EffectSet;
 use crate::RayKind;
 use crate::camera::Cone;
 use crate::kernel::{Kernel, MAX_LOBES};
@@ -24,6 +25,7 @@ use crate::material::{Colors, Material, Shading};
 use crate::sampler::{Dimension, PixelSampler};
 use crate::stage::Backdrop;
 use crate::surface::Surface;
+use crate::tally;
 
 /// Bounces at which a path splits instead of choosing.
 const SPLITS: u32 = 2;
@@ -363,6 +365,7 @@ impl Pending {
     /// Takes away what a way of length `t` absorbs.
     fn absorb(&mut self, t: f64) {
         if self.absorption != Vec3::ZERO {
+            tally::sample(EffectSet::ABSORPTION);
             self.throughput *= (self.absorption * -(t as f32)).map(f32::exp);
         }
     }

@@ -14,7 +14,7 @@ use super::tree::LightBounds;
 use super::{LightEnd, LightSample};
 use crate::distribution::Distribution1D;
 use crate::surface::World;
-use crate::warp;
+use crate::{EffectSet, tally, warp};
 
 /// A glowing rectangle or ball.
 #[derive(Clone, Debug)]
@@ -104,6 +104,7 @@ impl ShapeLight {
 
     /// A direction from `from` to the light.
     pub(crate) fn sample(&self, from: DVec3, u: [f32; 2]) -> Option<LightSample> {
+        tally::sample(EffectSet::AREA_LIGHTS);
         match &self.form {
             Form::Rectangle { corner, u: edge_u, v: edge_v, normal, area } => {
                 let at = *corner + *edge_u * f64::from(u[0]) + *edge_v * f64::from(u[1]);
@@ -254,6 +255,7 @@ impl MeshLight {
         u: [f32; 2],
         receiver: HitId,
     ) -> Option<(LightSample, Hit)> {
+        tally::sample(EffectSet::AREA_LIGHTS);
         let triangle = &self.triangles[i];
         if triangle.id == receiver {
             return None;

@@ -8,7 +8,7 @@ use glam::Vec3;
 use super::studio;
 use crate::distribution::Distribution2D;
 use crate::texture::floor;
-use crate::warp;
+use crate::{EffectSet, tally, warp};
 
 /// Light from all around: its radiance by direction, and how to choose directions in proportion to it.
 ///
@@ -128,7 +128,10 @@ impl Environment {
     pub fn radiance(&self, direction: Vec3) -> Vec3 {
         match &self.source {
             Source::Constant => self.scale,
-            Source::Map(map) => self.scale * map.bilinear(self.to_map(direction)),
+            Source::Map(map) => {
+                tally::look_up(EffectSet::ENVIRONMENT);
+                self.scale * map.bilinear(self.to_map(direction))
+            }
         }
     }
 
@@ -139,6 +142,7 @@ impl Environment {
         if self.scale.max_element() <= 0.0 {
             return None;
         }
+        tally::sample(EffectSet::ENVIRONMENT);
         match &self.source {
             Source::Constant => {
                 Some(EnvironmentSample { direction: warp::sphere(u), radiance: self.scale, pdf: 1.0 / (4.0 * PI) })
@@ -149,6 +153,7 @@ impl Environment {
 
     fn sample_map(&self, map: &Map, distribution: &Distribution2D, u: [f32; 2]) -> EnvironmentSample {
         let (uv, pdf) = map.sample(distribution, u);
+        tally::look_up(EffectSet::ENVIRONMENT);
         let direction = from_map([uv[0] - self.turn, uv[1]]);
         EnvironmentSample { direction, radiance: self.scale * map.bilinear(uv), pdf }
     }
@@ -161,7 +166,10 @@ impl Environment {
     pub(crate) fn sample_bright(&self, u: [f32; 2]) -> Option<EnvironmentSample> {
         match &self.source {
             Source::Constant => None,
-            Source::Map(map) => Some(self.sample_map(map, map.bright()?, u)),
+            Source::Map(map) => {
+                tally::sample(EffectSet::ENVIRONMENT);
+                Some(self.sample_map(map, map.bright()?, u))
+            }
         }
     }
 

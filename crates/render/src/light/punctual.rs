@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 use super::environment::luminance;
 use super::tree::LightBounds;
 use super::{LightEnd, LightSample};
-use crate::warp;
+use crate::{EffectSet, tally, warp};
 
 /// A light that a ray cannot hit.
 #[derive(Clone, Debug)]
@@ -111,6 +111,7 @@ impl PunctualLight {
 
     /// Light that arrives at a point. `radiance` is the irradiance on a surface that faces the light.
     pub(crate) fn sample(&self, point: DVec3, u: [f32; 2]) -> Option<LightSample> {
+        tally::sample(EffectSet::PUNCTUAL_LIGHTS);
         let (direction, radiance, end) = match self {
             Self::Point { position, intensity, range, cone } => {
                 let to = *position - point;

@@ -5,13 +5,13 @@ use glam::{Vec2, Vec3, Vec3Swizzles, Vec4Swizzles};
 
 use super::fresnel::Fresnel;
 use super::lobes::{Clearcoat, DiffuseTransmission, Lobe, Sheen};
-use super::pbr::{color, scalar};
+use super::pbr;
 use super::thin_film::Film;
 use super::{Conventions, LEAST_ALPHA, Textures, energy};
 use crate::kernel::Kernel;
 use crate::surface::Surface;
 use crate::texture::{ColorSpace, TextureLookup};
-use crate::{EffectSet, StageError};
+use crate::{EffectSet, StageError, tally};
 
 /// Index of refraction of clear coats.
 const COAT_IOR: f32 = 1.5;
@@ -143,7 +143,8 @@ impl Layers {
 
     fn coat_weight<K: Kernel>(&self, surface: &Surface<'_>) -> Option<(&Coat, f32)> {
         let coat = self.coat.as_ref()?;
-        let weight = (coat.factor * scalar::<K>(coat.texture.as_ref(), surface)).clamp(0.0, 1.0);
+        tally::sample(EffectSet::CLEARCOAT);
+        let weight = (coat.factor * scalar::<K>(EffectSet::CLEARCOAT, coat.texture.as_ref(), surface)).clamp(0.0, 1.0);
         (weight > 0.0).then_some((coat, weight))
     }
 
@@ -162,7 +163,8 @@ impl Layers {
         local: impl Fn(Vec3) -> Vec3,
     ) -> Option<(Lobe, f32)> {
         let (coat, weight) = self.coat_weight::<K>(surface)?;
-        let roughness = (coat.roughness * scalar::<K>(coat.roughness_texture.as_ref(), surface)).clamp(0.0, 1.0);
+        let roughness = (coat.roughness * scalar::<K>(EffectSet::CLEARCOAT, coat.roughness_texture.as_ref(), surface))
+            .clamp(0.0, 1.0);
         let mut normal =
             mapped::<K>(surface, coat.normal_texture.as_ref(), coat.normal_scale).unwrap_or(surface.smooth);
         if bend {
@@ -176,11 +178,12 @@ impl Layers {
     /// The sheen as a lobe, and what it leaves of the light below, at this cosine to the viewer.
     pub(super) fn sheen<K: Kernel>(&self, surface: &Surface<'_>, cos: f32) -> Option<(Sheen, f32)> {
         let sheen = self.sheen.as_ref()?;
-        let tint = sheen.color * color::<K>(sheen.color_texture.as_ref(), surface).xyz();
+        tally::sample(EffectSet::SHEEN);
+        let tint = sheen.color * color::<K>(EffectSet::SHEEN, sheen.color_texture.as_ref(), surface).xyz();
         if tint.max_element() <= 0.0 {
             return None;
         }
-        let roughness = sheen.roughness * scalar::<K>(sheen.roughness_texture.as_ref(), surface);
+        let roughness = sheen.roughness * scalar::<K>(EffectSet::SHEEN, sheen.roughness_texture.as_ref(), surface);
         // Albedo scaling as the extension has it, by the viewer's angle alone.
         let passed = 1.0 - tint.max_element() * energy::sheen(cos, roughness);
         Some((Sheen::new(tint, roughness), passed.max(0.0)))
@@ -189,11 +192,13 @@ impl Layers {
     /// The base's law of reflectance under the film.
     pub(super) fn filmed<K: Kernel>(&self, surface: &Surface<'_>, base: Fresnel) -> Fresnel {
         let (Some(film), Fresnel::Schlick { f0, f90, eta }) = (&self.film, base) else { return base };
-        let factor = (film.factor * scalar::<K>(film.texture.as_ref(), surface)).clamp(0.0, 1.0);
+        tally::sample(EffectSet::IRIDESCENCE);
+        let factor =
+            (film.factor * scalar::<K>(EffectSet::IRIDESCENCE, film.texture.as_ref(), surface)).clamp(0.0, 1.0);
         if factor == 0.0 {
             return base;
         }
-        let share = scalar::<K>(film.thickness_texture.as_ref(), surface);
+        let share = scalar::<K>(EffectSet::IRIDESCENCE, film.thickness_texture.as_ref(), surface);
         let thickness = film.thickness[0] + (film.thickness[1] - film.thickness[0]) * share;
         // Below a coat, that is what the film lies in.
         let coated = self.coat.as_ref().map_or(0.0, |c| c.factor);
@@ -204,10 +209,12 @@ impl Layers {
     /// The direction in which the surface is brushed.
     pub(super) fn brush<K: Kernel>(&self, surface: &Surface<'_>) -> Option<Brush> {
         let brushed = self.brushed.as_ref()?;
+        tally::sample(EffectSet::ANISOTROPY);
         let (mut direction, mut strength, mut set) = (brushed.rotation, brushed.strength, 0);
         if let Some(t) = brushed.texture.as_ref().filter(|_| K::TEXTURES) {
             set = t.uv_set();
-            let texel = surface.timed(|| t.color(surface.uv(set), surface.footprint(set)));
+            tally::look_up(EffectSet::ANISOTROPY);
+            let texel = surface.look_up(|| t.color(surface.uv(set), surface.footprint(set)));
             let along = texel.xy() * 2.0 - 1.0;
             direction = brushed.rotation.rotate(along.try_normalize().unwrap_or(Vec2::X));
             strength *= texel.z;
@@ -224,16 +231,36 @@ impl Layers {
         coat: Fresnel,
     ) -> Option<(DiffuseTransmission, f32)> {
         let through = self.through.as_ref()?;
-        let factor = (through.factor * scalar::<K>(through.texture.as_ref(), surface)).clamp(0.0, 1.0);
-        let tint = through.color * color::<K>(through.color_texture.as_ref(), surface).xyz();
+        tally::sample(EffectSet::DIFFUSE_TRANSMISSION);
+        let factor = (through.factor * scalar::<K>(EffectSet::DIFFUSE_TRANSMISSION, through.texture.as_ref(), surface))
+            .clamp(0.0, 1.0);
+        let tint =
+            through.color * color::<K>(EffectSet::DIFFUSE_TRANSMISSION, through.color_texture.as_ref(), surface).xyz();
         Some((DiffuseTransmission { color: tint * factor, coat }, factor))
     }
+}
+
+/// What a layer's texture says about a point.
+fn scalar<K: Kernel>(layer: EffectSet, lookup: Option<&TextureLookup>, surface: &Surface<'_>) -> f32 {
+    if lookup.is_some() {
+        tally::look_up(layer);
+    }
+    pbr::scalar::<K>(lookup, surface)
+}
+
+fn color<K: Kernel>(layer: EffectSet, lookup: Option<&TextureLookup>, surface: &Surface<'_>) -> glam::Vec4 {
+    if lookup.is_some() {
+        tally::look_up(layer);
+    }
+    pbr::color::<K>(lookup, surface)
 }
 
 /// The normal of a normal map, in the world and on the viewer's side.
 pub(super) fn mapped<K: Kernel>(surface: &Surface<'_>, texture: Option<&TextureLookup>, scale: f32) -> Option<Vec3> {
     let t = texture.filter(|_| K::TEXTURES)?;
-    let texel = surface.timed(|| t.color(surface.uv(t.uv_set()), surface.footprint(t.uv_set())));
+    tally::sample(EffectSet::NORMAL_MAPS);
+    tally::look_up(EffectSet::NORMAL_MAPS);
+    let texel = surface.look_up(|| t.color(surface.uv(t.uv_set()), surface.footprint(t.uv_set())));
     let n = (texel.xyz() * 2.0 - 1.0) * Vec3::new(scale, scale, 1.0);
     if n.is_finite() && n.xy() != Vec2::ZERO { surface.mapped_normal(n, t.uv_set()) } else { None }
 }

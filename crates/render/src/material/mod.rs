@@ -25,7 +25,7 @@ use pbr::Pbr;
 use crate::kernel::Kernel;
 use crate::surface::Surface;
 use crate::texture::{ColorSpace, Texture, TextureLookup};
-use crate::{EffectSet, StageError};
+use crate::{EffectSet, StageError, tally};
 
 /// Smoothest surface that is treated as rough: below it, a delta function is nearer to the truth than f32.
 const LEAST_ALPHA: f32 = 1e-3;
@@ -255,7 +255,10 @@ impl Material {
     pub(crate) fn emission<K: Kernel>(&self, surface: &Surface<'_>) -> Vec3 {
         match &self.model {
             Model::Pbr(pbr) | Model::Layered(pbr) if surface.front || pbr.double_sided => pbr.emission::<K>(surface),
-            Model::Emission(radiance) if surface.front => *radiance,
+            Model::Emission(radiance) if surface.front => {
+                tally::sample(EffectSet::EMISSION);
+                *radiance
+            }
             _ => Vec3::ZERO,
         }
     }

@@ -25,7 +25,7 @@ use super::{Bsdf, Conventions, LEAST_ALPHA, Shading, Textures};
 use crate::kernel::Kernel;
 use crate::surface::Surface;
 use crate::texture::{ColorSpace, TextureLookup};
-use crate::{EffectSet, StageError};
+use crate::{EffectSet, StageError, tally};
 
 /// A compiled [`PbrMaterial`].
 #[derive(Clone, Debug)]
@@ -46,6 +46,7 @@ pub(super) struct Pbr {
     alpha: AlphaMode,
     pub(super) double_sided: bool,
     unlit: bool,
+    vertex_colors: bool,
     ior: f32,
     transmission: f32,
     transmission_texture: Option<TextureLookup>,
@@ -78,14 +79,14 @@ pub(super) fn absorption(desc: &PbrMaterial, conventions: Conventions) -> Vec3 {
 /// The share of the colour texture, scalar textures and vertex colour of a point: 1 where there is none.
 pub(super) fn scalar<K: Kernel>(lookup: Option<&TextureLookup>, surface: &Surface<'_>) -> f32 {
     match lookup {
-        Some(t) if K::TEXTURES => surface.timed(|| t.scalar(surface.uv(t.uv_set()), surface.footprint(t.uv_set()))),
+        Some(t) if K::TEXTURES => surface.look_up(|| t.scalar(surface.uv(t.uv_set()), surface.footprint(t.uv_set()))),
         _ => 1.0,
     }
 }
 
 pub(super) fn color<K: Kernel>(lookup: Option<&TextureLookup>, surface: &Surface<'_>) -> glam::Vec4 {
     match lookup {
-        Some(t) if K::TEXTURES => surface.timed(|| t.color(surface.uv(t.uv_set()), surface.footprint(t.uv_set()))),
+        Some(t) if K::TEXTURES => surface.look_up(|| t.color(surface.uv(t.uv_set()), surface.footprint(t.uv_set()))),
         _ => glam::Vec4::ONE,
     }
 }
@@ -101,8 +102,8 @@ impl Pbr {
         let layers = Layers::new(desc, textures, conventions)?;
         let mut get =
             |texture: &Option<_>, space, wanted: bool| textures.get(texture.as_ref().filter(|_| wanted), space);
-        let transmission =
-            if has(EffectSet::REFRACTION) || has(EffectSet::TRANSMISSION) { desc.transmission } else { 0.0 };
+        let through = if desc.thickness > 0.0 { EffectSet::REFRACTION } else { EffectSet::TRANSMISSION };
+        let transmission = if has(through) { desc.transmission } else { 0.0 };
         let rough = desc.roughness_texture.is_some() || desc.roughness * desc.roughness > LEAST_ALPHA;
         let bends = (desc.ior - 1.0).abs() > 1e-3 && desc.ior.is_finite();
         let solid = desc.thickness > 0.0 && transmission > 0.0;
@@ -128,6 +129,7 @@ impl Pbr {
             },
             double_sided: desc.double_sided,
             unlit: desc.unlit && has(EffectSet::UNLIT),
+            vertex_colors: has(EffectSet::VERTEX_COLORS),
             ior: desc.ior,
             transmission,
             transmission_texture: get(&desc.transmission_texture, ColorSpace::Linear, textured)?,
@@ -194,12 +196,19 @@ impl Pbr {
     }
 
     fn base<K: Kernel>(&self, surface: &Surface<'_>) -> glam::Vec4 {
-        self.base_color * color::<K>(self.base_color_texture.as_ref(), surface) * surface.color()
+        let base = self.base_color * color::<K>(self.base_color_texture.as_ref(), surface);
+        if self.vertex_colors { base * surface.color() } else { base }
     }
 
     pub(super) fn coverage<K: Kernel>(&self, surface: &Surface<'_>) -> f32 {
-        if self.alpha == AlphaMode::Opaque {
-            return 1.0;
+        let effect = match self.alpha {
+            AlphaMode::Opaque => return 1.0,
+            AlphaMode::Mask { .. } => EffectSet::ALPHA_MASK,
+            AlphaMode::Blend => EffectSet::ALPHA_BLEND,
+        };
+        tally::sample(effect);
+        for _ in [&self.base_color_texture, &self.opacity_texture].into_iter().flatten() {
+            tally::look_up(effect);
         }
         let alpha = self.base::<K>(surface).w * scalar::<K>(self.opacity_texture.as_ref(), surface);
         match self.alpha {
@@ -232,11 +241,13 @@ impl Pbr {
 
     pub(super) fn emission<K: Kernel>(&self, surface: &Surface<'_>) -> Vec3 {
         if self.unlit {
+            tally::sample(EffectSet::UNLIT);
             return self.base::<K>(surface).xyz();
         }
         if self.emissive == Vec3::ZERO {
             return Vec3::ZERO;
         }
+        tally::sample(EffectSet::EMISSION);
         self.emissive * color::<K>(self.emissive_texture.as_ref(), surface).xyz()
     }
 
@@ -245,7 +256,7 @@ impl Pbr {
         let (metallic, roughness) = (self.metallic_texture.as_ref(), self.roughness_texture.as_ref());
         let shares = match (metallic, roughness) {
             (Some(m), Some(r)) if K::TEXTURES && self.one_lookup => {
-                surface.timed(|| m.scalars(r, surface.uv(m.uv_set()), surface.footprint(m.uv_set())))
+                surface.look_up(|| m.scalars(r, surface.uv(m.uv_set()), surface.footprint(m.uv_set())))
             }
             _ => [scalar::<K>(metallic, surface), scalar::<K>(roughness, surface)],
         };
@@ -385,9 +396,13 @@ impl Pbr {
         }
         let mut normal = layers::mapped::<K>(surface, self.normal_texture.as_ref(), self.normal_scale);
         if let Some(t) = &self.bump_texture {
+            tally::sample(EffectSet::NORMAL_MAPS);
             let (uv, width) = (surface.uv(t.uv_set()), surface.footprint(t.uv_set()));
             let step = t.texel_step().max(width);
-            let height = |du, dv| surface.timed(|| t.scalar(uv + glam::Vec2::new(du, dv), width));
+            let height = |du, dv| {
+                tally::look_up(EffectSet::NORMAL_MAPS);
+                surface.look_up(|| t.scalar(uv + glam::Vec2::new(du, dv), width))
+            };
             let half = 0.5 * step;
             let slope = glam::Vec2::new(height(half, 0.0) - height(-half, 0.0), height(0.0, half) - height(0.0, -half))
                 * (self.bump_scale / step);
