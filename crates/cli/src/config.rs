@@ -111,7 +111,9 @@ fn has_long(arg: &Arg, name: &str) -> bool {
 
 /// One entry as words of a command line.
 fn words(arg: &Arg, key: &str, value: &Value, exists: impl Fn(&str) -> bool) -> Result<Vec<String>, String> {
-    if !arg.get_action().takes_values() {
+    // A value that may be left out is one more thing than on and off.
+    let optional = arg.get_num_args().is_some_and(|n| n.min_values() == 0) && value.is_bool();
+    if optional || !arg.get_action().takes_values() {
         let Value::Boolean(on) = value else { return Err("expected true or false".into()) };
         let opposite = format!("no-{key}");
         return Ok(match on {

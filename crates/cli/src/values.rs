@@ -175,11 +175,11 @@ pub(crate) enum Explain {
     Ablations,
 }
 
-/// `costs` or `ablate`; configuration files may say `true` or `false`.
+/// `costs`, `ablate`, or `nothing`.
 pub(crate) fn explain(s: &str) -> Result<Explain, String> {
     match s {
-        "nothing" | "false" => Ok(Explain::Nothing),
-        "costs" | "true" => Ok(Explain::Costs),
+        "nothing" => Ok(Explain::Nothing),
+        "costs" => Ok(Explain::Costs),
         "ablate" => Ok(Explain::Ablations),
         _ => Err("expected costs or ablate".into()),
     }

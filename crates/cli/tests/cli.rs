@@ -452,6 +452,10 @@ fn ablations_say_what_the_image_would_be_without_each_effect() {
     folder.render(&["--explain=everything"]).fails(2, &["costs or ablate"]);
     folder.write("firsthit.toml", "explain = true\n");
     assert!(folder.render(&[]).code(0).stderr().contains("effects:"));
+    folder.write("firsthit.toml", "explain = false\n");
+    assert!(!folder.render(&[]).code(0).stderr().contains("effects:"));
+    folder.write("firsthit.toml", "explain = \"ablate\"\n");
+    assert!(folder.render(&["-q"]).code(0).stderr().contains("rmse"));
 }
 
 #[test]
