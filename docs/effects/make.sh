@@ -3,13 +3,13 @@
 # The folder has khronos/NAME/... in it, as the Khronos sample assets are laid out.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
-cargo build --release
+[ -n "${FIRSTHIT:-}" ] || cargo build --release
 out=docs/effects
 # MODEL NAME, then effects: the picture with all, and without each.
 ablate() {
   local model=$1 name=$2
   shift 2
-  local render=(target/release/firsthit render "$model" --resolution 256x192 --spp 128 --quiet)
+  local render=(${FIRSTHIT:-target/release/firsthit} render "$model" --resolution 256x192 --spp 128 --quiet)
   "${render[@]}" -o "$out/$name.png"
   for effect in "$@"; do
     "${render[@]}" --effects "auto,-$effect" -o "$out/$name-without-$effect.png"
