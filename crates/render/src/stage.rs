@@ -17,7 +17,7 @@ use crate::light::punctual::PunctualLight;
 use crate::material::{Conventions, Material, Textures};
 use crate::setting::{self, Setting};
 use crate::surface::World;
-use crate::texture::TextureError;
+use crate::texture::{TextureError, TextureLookup};
 use crate::{
     Background, CameraChoice, EffectPlan, EffectSet, KernelChoice, StageOptions, TextureFilter, framing, survey,
 };
@@ -92,6 +92,8 @@ pub(crate) struct Flags {
     pub(crate) lets_through: bool,
     /// It looks textures up.
     pub(crate) textured: bool,
+    /// Other rays than those that scatter at it look up its textures, always sharp.
+    pub(crate) sharp: bool,
 }
 
 impl Flags {
@@ -191,6 +193,7 @@ impl Stage {
             alpha: m.has_alpha(),
             lets_through: m.lets_through(),
             textured: m.is_textured(),
+            sharp: m.has_alpha() || m.glows() || m.lets_through(),
         });
         let flags: Vec<Flags> = flags.collect();
         // What no surface has keeps no kernel from being small.
@@ -217,6 +220,10 @@ impl Stage {
                 |id| {
                     let glow = |m: &Material| Glow { both_sides: m.glows_on_both_sides(), even: m.glows_evenly() };
                     Some(of(id)).filter(|m| m.glows()).map(glow)
+                },
+                |id| {
+                    let uv = |t: &TextureLookup| world.corner_uvs(id, t.uv_set());
+                    of(id).emissive_texture().is_some_and(|t| uv(t).is_some_and(|uv| t.is_black_over(uv)))
                 },
                 |id, u, v| {
                     let hit = firsthit_accel::Hit { id, t: 0.0, u, v, normal: glam::DVec3::Z };

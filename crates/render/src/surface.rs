@@ -76,6 +76,13 @@ impl World {
         }
     }
 
+    /// Texture coordinates of a triangle's corners; `None` where there are none.
+    pub(crate) fn corner_uvs(&self, id: HitId, set: usize) -> Option<[Vec2; 3]> {
+        let Part::Triangle { mesh, corners, .. } = self.part(id, 0.0, 0.0) else { return None };
+        let uvs = mesh.uvs.get(set).filter(|uvs| !uvs.is_empty())?;
+        Some(corners.map(|i| uvs[i]))
+    }
+
     /// Whether it is a shape, not a triangle.
     pub(crate) fn is_shape(&self, id: HitId) -> bool {
         let instance = &self.instances[id.instance as usize];
@@ -209,8 +216,9 @@ impl Surface<'_> {
         }
     }
 
-    /// Works out once what every texture of the first set asks for.
-    pub(crate) fn look(&mut self) {
+    /// Works out once what every texture of the first set asks for, with a cone of view that is at least this wide.
+    pub(crate) fn look(&mut self, width: f32) {
+        self.width = self.width.max(width);
         self.seen = Some(self.timed(|| (self.uv(0), self.footprint(0))));
     }
 

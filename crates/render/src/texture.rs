@@ -4,7 +4,7 @@
 //! image over exactly the area each of their texels covers, whatever the size; they are kept in the image's own
 //! number format, so the whole pyramid takes a third more memory than the image.
 
-use std::sync::{Arc, LazyLock};
+use std::sync::{Arc, LazyLock, OnceLock};
 
 use firsthit_import::scene::{Channel, Filter, ImageDesc, Pixels, TextureRef, Wrap};
 use glam::{Affine2, Vec2, Vec3, Vec4, Vec4Swizzles};
@@ -39,10 +39,15 @@ pub struct TextureError {
     pub pixels: usize,
 }
 
+/// Side of the blocks that are known to be black or not, in texels.
+const DARK_BLOCK: u32 = 8;
+
 /// An image with its smaller copies.
 #[derive(Clone, Debug)]
 pub struct Texture {
     space: ColorSpace,
+    /// For each block of the whole image whether all of it is black; made when first asked for.
+    dark: OnceLock<Vec<bool>>,
     /// From the whole image to a single texel.
     levels: Vec<Level>,
 }
@@ -75,7 +80,7 @@ impl Texture {
             let smaller = last.halved(space);
             levels.push(smaller);
         }
-        Ok(Self { space, levels })
+        Ok(Self { space, dark: OnceLock::new(), levels })
     }
 
     /// Width and height of the whole image in texels.
@@ -105,14 +110,80 @@ impl Texture {
         a.lerp(b, fx).lerp(c.lerp(d, fx), fy)
     }
 
-    /// `width`: of what is looked at, in texels of the whole image.
-    fn trilinear(&self, wrap: [Wrap; 2], uv: Vec2, width: f32) -> Vec4 {
+    /// One channel of [`Texture::bilinear`].
+    fn bilinear_of(&self, level: usize, wrap: [Wrap; 2], uv: Vec2, channel: usize) -> f32 {
+        let level = &self.levels[level];
+        let (x, fx) = neighbours(wrap[0], uv.x, level.width);
+        let (y, fy) = neighbours(wrap[1], uv.y, level.height);
+        let [a, b, c, d] = level.four_of(self.space, x, y, channel);
+        lerp(lerp(a, b, fx), lerp(c, d, fx), fy)
+    }
+
+    /// The two levels between which something `width` texels of the whole image wide is looked at, and how far it is
+    /// from the first to the second.
+    fn levels_of(&self, width: f32) -> ([usize; 2], f32) {
         let last = self.levels.len() - 1;
         // NaN and all up to one texel: the whole image.
         let level = if width > 1.0 { width.log2().min(last as f32) } else { 0.0 };
-        let (below, t) = (level as usize, level.fract());
+        let below = level as usize;
+        ([below, (below + 1).min(last)], level.fract())
+    }
+
+    /// `width`: of what is looked at, in texels of the whole image.
+    fn trilinear(&self, wrap: [Wrap; 2], uv: Vec2, width: f32) -> Vec4 {
+        let ([below, above], t) = self.levels_of(width);
         let value = self.bilinear(below, wrap, uv);
-        if t > 0.0 { value.lerp(self.bilinear((below + 1).min(last), wrap, uv), t) } else { value }
+        if t > 0.0 { value.lerp(self.bilinear(above, wrap, uv), t) } else { value }
+    }
+
+    /// One channel of [`Texture::trilinear`].
+    fn trilinear_of(&self, wrap: [Wrap; 2], uv: Vec2, width: f32, channel: usize) -> f32 {
+        let ([below, above], t) = self.levels_of(width);
+        let value = self.bilinear_of(below, wrap, uv, channel);
+        if t > 0.0 { lerp(value, self.bilinear_of(above, wrap, uv, channel), t) } else { value }
+    }
+
+    /// Whether the whole image is black between two of its texels, which may lie beyond its borders. False also where
+    /// that is not known.
+    fn is_black(&self, wrap: [Wrap; 2], low: [i64; 2], high: [i64; 2]) -> bool {
+        /// More blocks than these are not looked at.
+        const MOST: i64 = 4096;
+        let level = &self.levels[0];
+        let Pixels::Rgba8(texels) = &level.texels else { return false };
+        let (width, height) = (i64::from(level.width), i64::from(level.height));
+        let across = level.width.div_ceil(DARK_BLOCK) as usize;
+        let dark = self.dark.get_or_init(|| {
+            let mut dark = vec![true; across * level.height.div_ceil(DARK_BLOCK) as usize];
+            for (row, y) in texels.chunks_exact(level.width as usize).zip(0..) {
+                for (texel, x) in row.iter().zip(0..) {
+                    dark[(y / DARK_BLOCK as usize) * across + x / DARK_BLOCK as usize] &= texel[..3] == [0; 3];
+                }
+            }
+            dark
+        });
+        let step = i64::from(DARK_BLOCK);
+        // Steps of a block meet every block, unless one is cut by the border and the image goes on behind it.
+        let cut = |k: usize, n: i64| wrap[k] != Wrap::Clamp && n % step != 0;
+        let count = |k: usize| (high[k] - low[k]) / step + 2;
+        if low[0] > high[0] || low[1] > high[1] || cut(0, width) || cut(1, height) {
+            return false;
+        }
+        if count(0).saturating_mul(count(1)) > MOST {
+            return false;
+        }
+        let wrapped = |wrap: Wrap, i: i64, n: i64| match wrap {
+            Wrap::Repeat => i.rem_euclid(n),
+            Wrap::Mirror => {
+                let i = i.rem_euclid(2 * n);
+                i.min(2 * n - 1 - i)
+            }
+            Wrap::Clamp => i.clamp(0, n - 1),
+        };
+        let steps = |k: usize| (0..count(k)).map(move |i| (low[k] + i * step).min(high[k]));
+        steps(1).all(|y| {
+            let row = wrapped(wrap[1], y, height) as usize / DARK_BLOCK as usize;
+            steps(0).all(|x| dark[row * across + wrapped(wrap[0], x, width) as usize / DARK_BLOCK as usize])
+        })
     }
 }
 
@@ -183,7 +254,21 @@ impl TextureLookup {
     #[inline]
     #[must_use]
     pub fn scalar(&self, uv: Vec2, footprint: f32) -> f32 {
-        self.pick(self.lookup(uv, footprint))
+        let channel = match self.channel {
+            Channel::Red => 0,
+            Channel::Green => 1,
+            Channel::Blue => 2,
+            Channel::Alpha => 3,
+            Channel::Luminance => return self.pick(self.lookup(uv, footprint)),
+        };
+        // Of most images only this channel has to be decoded.
+        let at = self.transform.transform_point2(uv);
+        let value = match self.mode {
+            Mode::Nearest => return self.pick(self.lookup(uv, footprint)),
+            Mode::Bilinear => self.texture.bilinear_of(0, self.wrap, at, channel),
+            Mode::Trilinear => self.texture.trilinear_of(self.wrap, at, footprint * self.texels_per_uv, channel),
+        };
+        value * self.value_scale + self.value_offset
     }
 
     #[inline]
@@ -202,6 +287,24 @@ impl TextureLookup {
     #[must_use]
     pub fn texel_step(&self) -> f32 {
         if self.texels_per_uv > 0.0 { 1.0 / self.texels_per_uv } else { 1.0 }
+    }
+
+    /// Whether nothing but black is found anywhere in a triangle of the mesh's texture coordinates, at no footprint.
+    /// False also where that is not known.
+    pub(crate) fn is_black_over(&self, uv: [Vec2; 3]) -> bool {
+        /// Coordinates beyond these may be rounded by a texel.
+        const FAR: f32 = 1e4;
+        let at = uv.map(|uv| self.transform.transform_point2(uv));
+        let (low, high) = (at[0].min(at[1]).min(at[2]), at[0].max(at[1]).max(at[2]));
+        if self.value_offset != 0.0 || !(low.abs().max(high.abs()).max_element() < FAR) {
+            return false;
+        }
+        let (width, height) = self.texture.size();
+        let size = Vec2::new(width as f32, height as f32);
+        // Two texels more to each side than are mixed.
+        let (low, high) = (low * size - 3.0, high * size + 3.0);
+        let whole = |v: Vec2| [v.x.floor() as i64, v.y.floor() as i64];
+        self.texture.is_black(self.wrap, whole(low), whole(high))
     }
 
     /// Whether both read the same texels, of which they may take different channels.
@@ -257,7 +360,14 @@ fn fold(wrap: Wrap, t: f32) -> f32 {
     }
 }
 
+/// As that of vectors.
+#[inline]
+fn lerp(a: f32, b: f32, t: f32) -> f32 {
+    a * (1.0 - t) + b * t
+}
+
 /// The two texels beside a coordinate, and how far it lies from the first to the second.
+#[inline]
 fn neighbours(wrap: Wrap, t: f32, size: u32) -> ([u32; 2], f32) {
     let x = fold(wrap, t) * size as f32 - 0.5;
     let first = floor(x);
@@ -293,6 +403,16 @@ impl Level {
         };
         let (left, right) = (x[0] as usize, x[1] as usize);
         [at(upper + left), at(upper + right), at(lower + left), at(lower + right)]
+    }
+
+    /// One channel of [`Level::four`].
+    #[inline]
+    fn four_of(&self, space: ColorSpace, x: [u32; 2], y: [u32; 2], channel: usize) -> [f32; 4] {
+        let Pixels::Rgba8(p) = &self.texels else { return self.four(space, x, y).map(|v| v[channel]) };
+        let curve = if space == ColorSpace::Linear || channel == 3 { &*LINEAR_8 } else { &*SRGB_8 };
+        let (upper, lower) = (y[0] as usize * self.width as usize, y[1] as usize * self.width as usize);
+        let (left, right) = (x[0] as usize, x[1] as usize);
+        [upper + left, upper + right, lower + left, lower + right].map(|i| curve[usize::from(p[i][channel])])
     }
 
     fn texel(&self, space: ColorSpace, x: u32, y: u32) -> Vec4 {
@@ -492,6 +612,46 @@ mod tests {
     }
 
     /// Every level, of whatever size, has the mean of the whole image in linear, but for rounding to its bits.
+    #[test]
+    fn one_channel_is_that_of_all() {
+        let image = rgba8(8, 4, |x, y| [x as u8 * 30, y as u8 * 60, 200 - x as u8 * 20, 255 - y as u8 * 50]);
+        for space in [ColorSpace::Linear, ColorSpace::Srgb] {
+            for (i, channel) in [Channel::Red, Channel::Green, Channel::Blue, Channel::Alpha].into_iter().enumerate() {
+                let l = lookup(&image, space, |r| r.channel = channel);
+                for (u, v, footprint) in [(0.1, 0.2, 0.0), (0.93, -0.4, 0.3), (7.5, 0.01, 0.11), (0.5, 0.5, 2.0)] {
+                    let uv = Vec2::new(u, v);
+                    assert_eq!(l.scalar(uv, footprint), l.color(uv, footprint)[i], "{channel:?} {uv}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_black_over_a_triangle_never_shows_light() {
+        // Light in one texel of 64 x 32.
+        let image = rgba8(64, 32, |x, y| if (x, y) == (40, 20) { [0, 9, 0, 255] } else { [0, 0, 0, 255] });
+        for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
+            let l = lookup(&image, ColorSpace::Srgb, |r| (r.wrap_u, r.wrap_v) = (wrap, wrap));
+            let mut black = 0;
+            for k in 0..4000 {
+                let number =
+                    |i: u32| crate::sampler::PixelSampler::new(k, (0, 0), i).get2(crate::sampler::Dimension::Pixel);
+                let corner = Vec2::from(number(0)) * 4.0 - 2.0;
+                let [a, b, c] = [0, 1, 2].map(|i| corner + Vec2::from(number(1 + i)) * 0.3);
+                if l.is_black_over([a, b, c]) {
+                    black += 1;
+                    for i in 0..64 {
+                        let (x, y) = ((i % 8) as f32 / 7.0, (i / 8) as f32 / 7.0);
+                        let uv = a + (b - a) * (x * (1.0 - y)) + (c - a) * y;
+                        assert_eq!(l.color(uv, 0.0).xyz(), Vec3::ZERO, "{wrap:?} {uv}");
+                    }
+                }
+            }
+            assert!((500..4000).contains(&black), "{wrap:?}: {black}");
+            assert!(!l.is_black_over([Vec2::new(0.6, 0.6), Vec2::new(0.65, 0.6), Vec2::new(0.6, 0.7)]));
+        }
+    }
+
     #[test]
     fn bytes_of_the_srgb_curve_are_rounded() {
         for i in 0..=4096 {

@@ -35,6 +35,9 @@ use crate::tally;
 const ROULETTE: u32 = 2;
 /// Dim is what has lost more than all but this share of its light: measured, the best for time and noise together.
 const DIM: f32 = 1.0 / 3.0;
+/// The solid angle that one of many scattered paths stands for, where they are evenly dense: what textures show within
+/// it is averaged.
+const VIEW: f32 = 1.0 / 256.0;
 /// At so many surfaces in a row that let a ray pass, it meets the next.
 const MOST_LAYERS: u32 = 500;
 
@@ -58,6 +61,8 @@ struct Walk {
     scale: f32,
     /// Which colours it is about.
     colors: Colors,
+    /// How much wider its view of textures becomes for each unit of distance, since it was scattered.
+    spread: f32,
 }
 
 /// A point at which one light was asked.
@@ -108,6 +113,7 @@ impl<K: Kernel> Tracer<'_, K> {
             scattered: None,
             scale: 1.0,
             colors: self.colors(sampler),
+            spread: 0.0,
         };
         let mut hit = first;
         loop {
@@ -191,7 +197,9 @@ impl<K: Kernel> Tracer<'_, K> {
         let index = stage.world.material(hit.id);
         let material = &stage.materials[index];
         if K::TEXTURES && stage.flags[index].textured {
-            surface.look();
+            // What glows or has holes is asked for by light as well, which sees it sharp.
+            let spread = if stage.flags[index].sharp { 0.0 } else { walk.spread * hit.t as f32 };
+            surface.look(spread);
         }
 
         if K::FILTERED && material.has_alpha() && walk.layers < MOST_LAYERS {
@@ -277,6 +285,9 @@ impl<K: Kernel> Tracer<'_, K> {
             LobeKind::TRANSMISSION => RayKind::Transmission,
             _ => RayKind::Indirect,
         };
+        if let Some(pdf) = on.pdf {
+            walk.spread = walk.spread.max((VIEW / pdf).sqrt());
+        }
         walk.straight &= unbent;
         walk.layers = 0;
         walk.source = Some(surface.id);

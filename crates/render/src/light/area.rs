@@ -285,7 +285,7 @@ impl MeshLight {
     #[inline]
     pub(crate) fn index(&self, id: HitId) -> Option<usize> {
         let first = self.first.get(&(id.instance, id.geometry))?;
-        self.parts.get(first + id.primitive as usize).map(|i| *i as usize)
+        self.parts.get(first + id.primitive as usize).filter(|i| **i != NO_LIGHT).map(|i| *i as usize)
     }
 
     /// Density over solid angle of a point that is chosen evenly on a triangle.
@@ -297,6 +297,9 @@ impl MeshLight {
         if pdf.is_finite() { pdf as f32 } else { 0.0 }
     }
 }
+
+/// In place of a glowing triangle: it is black.
+const NO_LIGHT: u32 = u32::MAX;
 
 /// How a geometry glows.
 #[derive(Clone, Copy, Debug)]
@@ -319,11 +322,13 @@ pub(crate) struct AreaLights {
 }
 
 impl AreaLights {
-    /// `radiance(id, u, v)` says about how much comes from a point of a glowing geometry; `None` for others.
+    /// `radiance(id, u, v)` says about how much comes from a point of a glowing geometry; `None` for others. Of triangles
+    /// that are `dark` nothing comes for certain: they are not asked.
     pub(crate) fn new(
         lights: impl Iterator<Item = ShapeLight>,
         world: &World,
         glowing: impl Fn(HitId) -> Option<Glow>,
+        dark: impl Fn(HitId) -> bool,
         radiance: impl Fn(HitId, f32, f32) -> Vec3,
     ) -> Self {
         let mut area = Self { shapes: lights.collect(), ..Self::default() };
@@ -340,6 +345,10 @@ impl AreaLights {
                         let before = triangles.len();
                         for (k, corners) in mesh.triangles.iter().enumerate() {
                             let id = HitId { primitive: k as u32, ..id };
+                            if !even && dark(id) {
+                                parts.push(NO_LIGHT);
+                                continue;
+                            }
                             let local = corners.map(|c| mesh.positions[c as usize].as_dvec3());
                             let corners = local.map(|p| instance.transform.transform_point3(p));
                             let cross = (corners[1] - corners[0]).cross(corners[2] - corners[0]);

@@ -241,6 +241,11 @@ impl Material {
         }
     }
 
+    /// What its glow is multiplied with.
+    pub(crate) fn emissive_texture(&self) -> Option<&TextureLookup> {
+        self.pbr().and_then(Pbr::emissive_texture)
+    }
+
     /// Whether it glows on both sides.
     pub(crate) fn glows_on_both_sides(&self) -> bool {
         self.pbr().is_some_and(|p| p.double_sided)

@@ -191,6 +191,10 @@ impl Pbr {
         self.emissive.max_element() > 0.0 && !self.unlit
     }
 
+    pub(super) fn emissive_texture(&self) -> Option<&TextureLookup> {
+        self.emissive_texture.as_ref()
+    }
+
     pub(super) fn glows_evenly(&self) -> bool {
         self.emissive_texture.is_none() && !self.has_alpha()
     }
