@@ -193,7 +193,7 @@ impl Stage {
             alpha: m.has_alpha(),
             lets_through: m.lets_through(),
             textured: m.is_textured(),
-            sharp: m.has_alpha() || m.glows() || m.lets_through(),
+            sharp: !mips || m.lets_through() || m.glows(),
         });
         let flags: Vec<Flags> = flags.collect();
         // What no surface has keeps no kernel from being small.
