@@ -336,7 +336,7 @@ impl TextureLookup {
 #[inline]
 pub(crate) fn floor(t: f32) -> f32 {
     /// From here on all numbers are whole.
-    const WHOLE: f32 = (1 << f32::MANTISSA_DIGITS - 1) as f32;
+    const WHOLE: f32 = (1 << (f32::MANTISSA_DIGITS - 1)) as f32;
     if t.abs() < WHOLE {
         let cut = t as i32 as f32;
         if cut > t { cut - 1.0 } else { cut }
