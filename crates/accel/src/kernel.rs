@@ -42,7 +42,7 @@ pub(crate) struct Found {
 }
 
 /// Where the ray meets the plane of a triangle.
-struct Plane {
+pub(crate) struct Plane {
     t: f64,
     normal: DVec3,
     grazing: bool,
@@ -50,7 +50,7 @@ struct Plane {
 
 impl Plane {
     #[inline(always)]
-    fn at(self, u: f32, v: f32) -> Found {
+    pub(crate) fn at(self, u: f32, v: f32) -> Found {
         Found { t: self.t, u, v, normal: self.normal, grazing: self.grazing, fallback: false }
     }
 
@@ -82,7 +82,7 @@ const LEAST: f64 = 1.0 / 32.0;
 /// tilts the plane, about that vertex, by a few roundings over the sine between the edges: `t` is off by that times the
 /// triangle's length. So no more is lost if `t` times the sine is larger than the span times `loss`.
 #[inline(always)]
-fn plane(vertices: &[Vec3; 3], ray: &LocalRay, loss: f64, from: f64) -> Option<Plane> {
+pub(crate) fn plane(vertices: &[Vec3; 3], ray: &LocalRay, loss: f64, from: f64) -> Option<Plane> {
     let [a, b, c] = double(vertices);
     let (e1, e2, r) = (b - a, c - a, a - ray.origin);
     let normal = e1.cross(e2);
@@ -196,7 +196,7 @@ impl Kernel for Fast {
 
 impl Fast {
     #[inline(always)]
-    fn found([t, u, v]: [f32; 3], ray: &LocalRay, vertices: &[Vec3; 3]) -> Found {
+    pub(crate) fn found([t, u, v]: [f32; 3], ray: &LocalRay, vertices: &[Vec3; 3]) -> Found {
         let [a, b, c] = double(vertices);
         let normal = (b - a).cross(c - a);
         Found { t: f64::from(t) + ray.shift, u, v, normal, grazing: true, fallback: false }

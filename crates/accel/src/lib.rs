@@ -38,8 +38,11 @@ mod layout;
 mod local;
 mod model;
 mod normalise;
+mod offer;
 mod order;
 mod packet;
+#[allow(unsafe_code, reason = "advice to the system about memory")]
+mod pages;
 mod query;
 pub mod reference;
 mod refit;

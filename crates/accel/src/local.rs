@@ -87,6 +87,15 @@ impl Extent {
     }
 }
 
+/// `t` (local, counted from the true origin) as an end of the box tests' interval, on the side where no box is missed.
+#[inline(always)]
+pub(crate) fn box_t(t: f64, shift: f64, side: f64) -> f32 {
+    let local = t - shift;
+    // Entry into a box has four roundings in f32 (and one more is made here), `local` and `t` have a few in f64.
+    let error = local.abs() * (16.0 * U) + (t.abs() + shift.abs()) * (16.0 * f64::UNIT_ROUNDOFF);
+    (local + side * error).to_f32()
+}
+
 /// A ray in an object's normalised space. Its parameter is `world t * t_scale`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LocalRay {
@@ -101,13 +110,13 @@ pub(crate) struct LocalRay {
     /// The moved origin is `origin + shift * direction`, and its parameter counts from there.
     pub(crate) shift: f64,
     /// The world ray's interval.
-    world: [f64; 2],
+    pub(crate) world: [f64; 2],
     /// How far moving may have rounded the origin off the line, in each axis.
-    off: f64,
+    pub(crate) off: f64,
     /// Largest coordinate difference between the moved origin and the object.
-    farthest: f64,
+    pub(crate) farthest: f64,
     /// Not below [`LocalRay::reach`] in any axis.
-    most: f64,
+    pub(crate) most: f64,
     /// By how much, in each axis, boxes are met as if larger: more than eight times [`LocalRay::reach`], since so far
     /// from its triangle a hit may lie (that of a ray which does not graze the plane).
     pub(crate) delta: f32,
@@ -229,11 +238,7 @@ impl LocalRay {
 
     #[inline(always)]
     fn box_t(&self, t: f64, side: f64) -> f32 {
-        let t = t * self.t_scale;
-        let local = t - self.shift;
-        // Entry into a box has four roundings in f32 (and one more is made here), `local` and `t` have a few in f64.
-        let error = local.abs() * (16.0 * U) + (t.abs() + self.shift.abs()) * (16.0 * f64::UNIT_ROUNDOFF);
-        (local + side * error).to_f32()
+        box_t(t * self.t_scale, self.shift, side)
     }
 
     /// Whether an edge function of the triangle is so small that what the tier rounds may have decided its sign.

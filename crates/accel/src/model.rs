@@ -11,17 +11,18 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use crate::build::Topology;
-use crate::kernel::{Found, Kernel, double};
+use crate::kernel::{Kernel, double};
 use crate::layout::Bvh2;
 use crate::layout::compact8::{self, Compact8};
 use crate::layout::wide8::{self, Wide8};
 use crate::local::{Extent, LocalRay};
 use crate::normalise::common_scale;
+use crate::offer::{OfferTo, OfferTriangle};
 use crate::query::{Candidate, Closest, Collect, Collector, Dyn};
 use crate::simd::{self, Available, Lanes, Work};
 use crate::stats::{DynProbe, Off, Probe};
 use crate::traverse::traverse;
-use crate::wide::{self, BoxRay, Visit, WideTree};
+use crate::wide::{self, BoxSetup, Boxes, WideTree};
 use crate::{BuildError, BuildOptions, Geometry, Guards, Hit, HitId, Layout};
 
 /// The parts of one mesh, ready to be traced.
@@ -44,7 +45,7 @@ pub(crate) struct Model {
     bounds: Aabb<f64>,
     extent: Extent,
     degenerate: u64,
-    guards: Guards,
+    pub(crate) guards: Guards,
 }
 
 /// The tree with its triangles, which lie in the order of the leaves, divided by the model's scale.
@@ -473,19 +474,15 @@ impl Model {
         let ray = &ray;
         let offer = OfferTriangle::<SURFACES, K>::new(self, ray, instance, collector);
         let filter = K::filter::<L>(&offer.setup, ray);
-        let boxes = BoxRay {
-            origin: ray.origin32,
-            direction: ray.direction32,
-            delta: if K::padded(&offer.setup) { ray.delta } else { 0.0 },
-            t_min: ray.box_t_min(collector.t_min()),
-            t_max: ray.box_t_max(collector.t_max()),
-        };
+        let delta = if K::padded(&offer.setup) { ray.delta } else { 0.0 };
+        let boxes = Boxes::<L>::new(&BoxSetup::new::<L>(ray.origin32, ray.direction32, delta));
+        let interval = [ray.box_t_min(collector.t_min()), ray.box_t_max(collector.t_max())];
         let ordered = collector.ordered();
         let mut visitor = OfferTo { offer, collector };
         if ordered {
-            wide::traverse::<L, T, _, P, true>(tree, &boxes, &filter, probe, &mut visitor)
+            wide::traverse::<L, T, _, P, true>(tree, &boxes, interval, &filter, probe, &mut visitor)
         } else {
-            wide::traverse::<L, T, _, P, false>(tree, &boxes, &filter, probe, &mut visitor)
+            wide::traverse::<L, T, _, P, false>(tree, &boxes, interval, &filter, probe, &mut visitor)
         }
     }
 
@@ -666,64 +663,6 @@ impl ModelShape {
     }
 }
 
-/// Tests triangles for one ray, and offers what is hit.
-struct OfferTriangle<'a, const SURFACES: bool, K: Kernel> {
-    model: &'a Model,
-    ray: &'a LocalRay,
-    instance: u32,
-    setup: K::Setup,
-    /// End of the interval in the instance's space.
-    limit: f64,
-}
-
-impl<'a, const SURFACES: bool, K: Kernel> OfferTriangle<'a, SURFACES, K> {
-    #[inline(always)]
-    fn new<C: Collector>(model: &'a Model, ray: &'a LocalRay, instance: u32, collector: &C) -> Self {
-        Self { model, ray, instance, setup: K::setup(ray, model.guards), limit: collector.t_max() * ray.t_scale }
-    }
-
-    /// The new end of the boxes' interval if the hit was taken.
-    #[inline(always)]
-    fn offer<C: Collector, P: Probe>(
-        &mut self,
-        place: usize,
-        triangle: &[Vec3; 3],
-        known: Option<[f32; 3]>,
-        collector: &mut C,
-        probe: &mut P,
-    ) -> ControlFlow<(), Option<f32>> {
-        let found = match known {
-            _ if SURFACES => K::crosses(&self.setup, self.ray, triangle, self.limit),
-            Some(known) => K::test_known(&self.setup, self.ray, triangle, known, self.limit),
-            None => K::test(&self.setup, self.ray, triangle, self.limit),
-        };
-        let Some(Found { mut t, u, v, normal, grazing, fallback }) = found else { return ControlFlow::Continue(None) };
-        if fallback {
-            probe.fallback();
-        }
-        if grazing && K::clamped(&self.setup) {
-            let Some(within) = within_triangle(*self.ray, t, *triangle) else { return ControlFlow::Continue(None) };
-            t = within;
-        }
-        let t = t * self.ray.t_unscale;
-        // Before anything is fetched about it.
-        if !(collector.t_min() <= t && t <= collector.t_max()) {
-            return ControlFlow::Continue(None);
-        }
-        let Some(id) = self.model.id(place) else { return ControlFlow::Continue(None) };
-        let id = HitId { instance: self.instance, geometry: id.geometry, primitive: id.primitive };
-        let taken = collector.offer(Candidate::new(id, t, u, v, normal))?;
-        ControlFlow::Continue(if taken { Some(self.shortened(collector)) } else { None })
-    }
-
-    /// The end of the boxes' interval, now that a hit was taken.
-    #[inline(always)]
-    fn shortened<C: Collector>(&mut self, collector: &C) -> f32 {
-        self.limit = collector.t_max() * self.ray.t_scale;
-        self.ray.box_t_max(collector.t_max())
-    }
-}
-
 /// Traversal of a tree of eight children a node.
 struct TraceWide<'a, const SURFACES: bool, T, K, C, P> {
     model: &'a Model,
@@ -746,33 +685,6 @@ impl<const SURFACES: bool, T: WideTree, K: Kernel, C: Collector, P: Probe> Work
         let Self { model, tree, ray, of, collector, probe, .. } = self;
         model.trace_wide::<L, SURFACES, T, K, C, P>(tree, ray, of, collector, probe)
     }
-}
-
-/// Offers the triangles of the wide tree.
-struct OfferTo<'a, const SURFACES: bool, K: Kernel, C> {
-    offer: OfferTriangle<'a, SURFACES, K>,
-    collector: &'a mut C,
-}
-
-impl<const SURFACES: bool, K: Kernel, C: Collector, P: Probe> Visit<P> for OfferTo<'_, SURFACES, K, C> {
-    #[inline(always)]
-    fn visit(
-        &mut self,
-        place: usize,
-        triangle: &[Vec3; 3],
-        known: [f32; 3],
-        probe: &mut P,
-    ) -> ControlFlow<(), Option<f32>> {
-        self.offer.offer(place, triangle, Some(known), self.collector, probe)
-    }
-}
-
-/// [`LocalRay::within_box`] for a triangle. By value, as `careful_plane`.
-#[cold]
-#[inline(never)]
-fn within_triangle(ray: LocalRay, t: f64, vertices: [Vec3; 3]) -> Option<f64> {
-    let [a, b, c] = double(&vertices);
-    ray.within_box(t, &Aabb::new(a.min(b).min(c), a.max(b).max(c)))
 }
 
 /// Shapes are evaluated in `f64` at the tiers below `Exact`: by the shortest formulas or by the stable ones.

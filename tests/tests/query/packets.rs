@@ -97,6 +97,42 @@ fn shadow_rays_to_one_light() {
     }
 }
 
+/// Rays into all directions from anywhere, in lists of every length; some can't hit anything, some are whole lines.
+#[test]
+fn rays_that_have_nothing_in_common() {
+    let mut rng = Rng(11);
+    let mut vector = move || DVec3::new(rng.signed(), rng.signed(), rng.signed());
+    let rays: Vec<Ray<f64>> = (0..4096)
+        .map(|k| {
+            let (from, to) = (vector() * 3.0, vector() * 0.7);
+            match k % 61 {
+                7 => Ray::new(from, DVec3::ZERO),
+                17 => Ray::new(from, DVec3::NAN),
+                27 => Ray::new(from * f64::INFINITY, to - from),
+                37 => Ray::new(from, to - from).with_interval(2.0, 1.0),
+                47 => Ray::new(from, to - from).with_interval(f64::NEG_INFINITY, f64::INFINITY),
+                57 => Ray::new(from * 1e9, to - from * 1e9),
+                _ if k % 3 == 0 => Ray::segment(from, to),
+                _ => Ray::new(from, to - from),
+            }
+        })
+        .collect();
+    let turned = DAffine3::from_rotation_y(0.4) * DAffine3::from_scale(DVec3::new(1.0, 2.0, 0.5));
+    for (name, mesh) in [("ball", icosphere(5)), ("one leaf", soup(&mut Rng(6), 6)), ("soup", soup(&mut Rng(5), 3000))] {
+        for precision in Precision::ALL {
+            for simd in Level::ALL {
+                let options = BuildOptions { precision, simd, ..BuildOptions::default() };
+                let hits = same(&scene(&mesh, turned, options), &rays, &format!("{name}, {precision}, {simd}"));
+                assert!(hits > 100, "{name}: {hits}");
+            }
+        }
+    }
+    let scene = scene(&icosphere(4), turned, BuildOptions::default());
+    for length in 0..80 {
+        same(&scene, &rays[length..2 * length], &format!("{length} rays"));
+    }
+}
+
 /// Of one direction, but far from each other: such rays are given up as packets when they have visited too much, and
 /// packets are tried again later. Neighbours among them make some that are not given up.
 #[test]

@@ -13,6 +13,7 @@ use rayon::prelude::*;
 use super::compact8::fits;
 use super::wide8::{Block, Node, Reference, Wide8, leaf_cost};
 use crate::build::{Child, Topology};
+use crate::pages;
 
 /// Triangles in a leaf at most.
 const LEAF: u32 = 8;
@@ -323,6 +324,9 @@ impl Wide8 {
         top.nodes.reserve_exact(sum(|p| p.nodes.len()));
         top.blocks.reserve_exact(sum(|p| p.blocks.len()) + 1);
         top.order.reserve_exact(sum(|p| p.blocks.len() * 4) + 8);
+        pages::advise(&mut top.nodes);
+        pages::advise(&mut top.blocks);
+        pages::advise(&mut top.order);
         for (Later { node, slot, .. }, part, reference) in parts {
             let moved = top.append(part);
             top.nodes[node].children[slot] = moved(reference).0;

@@ -10,7 +10,7 @@ use core::ops::Range;
 use firsthit_geometry::Aabb;
 use glam::Vec3;
 
-use crate::simd::Lanes;
+use crate::simd::{Lanes, prefetch};
 use crate::wide::{Axis, BoxNode, Leaf, WideTree};
 
 /// A tree of eight children a node.
@@ -241,6 +241,16 @@ impl WideTree for Wide8 {
     #[inline(always)]
     fn triangle(&self, place: usize) -> [Vec3; 3] {
         self.blocks[place / 4].triangle(place)
+    }
+
+    #[inline(always)]
+    fn prefetch(&self, at: Reference) {
+        if at.is_leaf() {
+            prefetch(&self.blocks[at.block()]);
+            prefetch(&self.blocks[at.block() + usize::from(at.lanes() > 0xf)]);
+        } else {
+            prefetch(&self.nodes[at.index()]);
+        }
     }
 }
 

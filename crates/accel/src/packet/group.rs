@@ -1,12 +1,12 @@
 //! Eight rays side by side, one in each lane: what [`LocalRay`](crate::local::LocalRay) is for one.
 
 use firsthit_geometry::{Ray, Real, transform::Transform};
-use glam::DMat3;
+use glam::{DMat3, DVec3, Vec3};
 
 use super::vectors::{self, Vectors};
-use crate::local::{Extent, FAR, TINY, U};
-use crate::simd::{Eight, Lanes, Packed, Portable};
-use crate::wide::SMALLEST;
+use crate::local::{Extent, FAR, LocalRay, TINY, U, box_t};
+use crate::simd::{Eight, Lanes};
+use crate::wide::{Boxes, SMALLEST};
 
 /// A number of each ray.
 pub(super) type Doubles = [f64; 8];
@@ -99,6 +99,12 @@ pub(super) fn transformed<E: Eight>(m: &DMat3, v: Vectors<E>) -> Vectors<E> {
 fn to_object<E: Eight>(transform: &Transform, v: Vectors<E>) -> Vectors<E> {
     let inverse = transform.inverse_linear();
     if transform.is_uniform() { vectors::scaled(v, E::splat(inverse.x_axis.x)) } else { transformed(&inverse, v) }
+}
+
+/// Of the axis that is so many after the one that each ray follows most.
+#[inline(always)]
+fn ordered<L: Lanes>(v: [L; 3], after: usize, second: u32, third: u32) -> L {
+    v[(after + 1) % 3].choose(second, v[(after + 2) % 3].choose(third, v[after % 3]))
 }
 
 /// A number of each of eight rays.
@@ -231,6 +237,57 @@ impl Group {
         L::load(&self.direction32[axes[1]]).div(z).put(&mut self.slopes[1]);
     }
 
+    /// Wakes all that can hit anything, each to go its own way: the sheared axes are in its own order.
+    #[inline(always)]
+    pub(super) fn part<L: Lanes>(&mut self) {
+        self.sleep::<L>(self.valid);
+        let [second, third] = [self.second & !self.third, self.third];
+        let (o, d) = (&self.origin32, &self.direction32);
+        let (o, d) =
+            ([L::load(&o[0]), L::load(&o[1]), L::load(&o[2])], [L::load(&d[0]), L::load(&d[1]), L::load(&d[2])]);
+        let (ox, oy, oz) = (ordered(o, 1, second, third), ordered(o, 2, second, third), ordered(o, 0, second, third));
+        let (dx, dy, dz) = (ordered(d, 1, second, third), ordered(d, 2, second, third), ordered(d, 0, second, third));
+        ox.put(&mut self.sheared[0]);
+        oy.put(&mut self.sheared[1]);
+        oz.put(&mut self.sheared[2]);
+        dx.div(dz).put(&mut self.slopes[0]);
+        dy.div(dz).put(&mut self.slopes[1]);
+    }
+
+    /// One ray among boxes.
+    #[inline(always)]
+    pub(super) fn boxes<L: Lanes>(&self, lane: usize) -> Boxes<L> {
+        let axis =
+            |k: usize| (self.inverse[k][lane], [self.near[k][lane], self.far[k][lane]], self.negative[k] >> lane & 1);
+        Boxes::known([axis(0), axis(1), axis(2)])
+    }
+
+    /// One of the rays, as it is alone.
+    #[inline(always)]
+    pub(super) fn local(&self, lane: usize, magnitude: f64) -> LocalRay {
+        let vector = |v: &[Doubles; 3]| DVec3::new(v[0][lane], v[1][lane], v[2][lane]);
+        let single = |v: &[Singles; 3]| Vec3::new(v[0][lane], v[1][lane], v[2][lane]);
+        let shift = self.shift[lane];
+        let off = shift.abs() * (32.0 * f64::UNIT_ROUNDOFF);
+        LocalRay {
+            origin: vector(&self.origin),
+            direction: vector(&self.direction),
+            t_scale: self.t_scale[lane],
+            t_unscale: self.t_unscale[lane],
+            shift,
+            world: [self.t_min[lane], self.t_max[lane]],
+            off,
+            farthest: self.farthest[lane],
+            most: self.farthest[lane] * (9.1 * U) + (magnitude * (1.1 * U) + off),
+            delta: self.delta[lane],
+            t_min: self.local_t_min[lane],
+            span: self.span[lane],
+            length_squared: self.length_squared[lane],
+            origin32: single(&self.origin32),
+            direction32: single(&self.direction32),
+        }
+    }
+
     /// Puts all but some lanes to sleep.
     #[inline(always)]
     fn sleep<L: Lanes>(&mut self, awake: u32) {
@@ -252,9 +309,8 @@ impl Group {
     }
 
     /// The same for the end of one ray's interval.
+    #[inline(always)]
     pub(super) fn box_t_of(&self, lane: usize) -> f32 {
-        let mut end = [0.0; 8];
-        self.box_t::<Portable>(Eight::load(&self.t_max), 1.0).put(&mut end);
-        end[lane]
+        box_t(self.t_max[lane] * self.t_scale[lane], self.shift[lane], 1.0)
     }
 }

@@ -4,6 +4,7 @@
 //! met by all together. The answers are those of single rays, bit by bit (of `Fast` but for rays at the very edges of
 //! boxes, which a packet may find where a single ray does not).
 
+mod alone;
 mod frustum;
 mod group;
 mod tier;
@@ -15,7 +16,7 @@ use glam::DVec3;
 
 pub(crate) use tier::Tier;
 
-use crate::layout::wide8::Wide8;
+use crate::layout::wide8::{Reference, Wide8};
 use crate::model::Model;
 use crate::simd::{Eight, Lanes};
 use crate::{Hit, HitId};
@@ -31,7 +32,7 @@ pub(crate) const RAYS: usize = 8 * GROUPS;
 
 /// Nodes and leaves that a packet may visit: about as many as its rays would, one by one, in a large scene. Rays of one
 /// direction that begin far apart visit far more than that.
-const MOST_VISITS: u32 = 24 * RAYS as u32;
+const MOST_VISITS: u32 = 8 * RAYS as u32;
 
 /// After a packet that visited too much, so many at most go one by one before it is tried again.
 const LONGEST_PAUSE: u32 = 63;
@@ -42,6 +43,7 @@ pub(crate) struct Packet<'a> {
     tree: &'a Wide8,
     transform: &'a Transform,
     groups: [Group; GROUPS],
+    courses: alone::Courses,
     /// How many packets are not tried, and how many will not be after the next that visits too much.
     paused: u32,
     pause: u32,
@@ -51,7 +53,15 @@ impl<'a> Packet<'a> {
     /// For the only instance of a scene.
     #[inline(always)]
     pub(crate) fn new(model: &'a Model, tree: &'a Wide8, transform: &'a Transform) -> Self {
-        Self { model, tree, transform, groups: [Group::default(); GROUPS], paused: 0, pause: 1 }
+        Self {
+            model,
+            tree,
+            transform,
+            groups: [Group::default(); GROUPS],
+            courses: alone::Courses::new(),
+            paused: 0,
+            pause: 1,
+        }
     }
 
     /// Whether rays may well go together: seen from a few of them and from the packets before, which is all that rays pay
@@ -98,6 +108,45 @@ impl<'a> Packet<'a> {
         true
     }
 
+    /// The nearest hit of each ray, whatever way they go.
+    #[inline(always)]
+    pub(crate) fn closest_alone<L: Lanes, T: Tier>(&mut self, rays: &[Ray<f64>], hits: &mut [Option<Hit>]) {
+        self.alone::<L, T, false>(rays);
+        for (group, hits) in self.groups.iter_mut().zip(hits.as_chunks_mut::<8>().0) {
+            group.finish::<L>(self.model, self.transform, hits);
+        }
+    }
+
+    /// Whether each ray hits anything, whatever way they go.
+    #[inline(always)]
+    pub(crate) fn any_alone<L: Lanes, T: Tier>(&mut self, rays: &[Ray<f64>], hits: &mut [bool]) {
+        self.alone::<L, T, true>(rays);
+        for (group, hits) in self.groups.iter().zip(hits.as_chunks_mut::<8>().0) {
+            for (lane, hit) in hits.iter_mut().enumerate() {
+                *hit = group.hit >> lane & 1 == 1;
+            }
+        }
+    }
+
+    /// Eights of rays, as many as a packet holds.
+    #[inline(always)]
+    fn alone<L: Lanes, T: Tier, const ANY: bool>(&mut self, rays: &[Ray<f64>]) {
+        let Self { model, tree, transform, groups, courses, .. } = self;
+        let rays = rays.as_chunks::<8>().0;
+        let entry = Entry { transform, extent: model.extent(), padded: T::PADDED };
+        for (rays, groups) in rays.chunks(alone::GROUPS).zip(groups.as_chunks_mut::<{ alone::GROUPS }>().0) {
+            for (k, group) in groups.iter_mut().enumerate() {
+                match rays.get(k) {
+                    Some(rays) => group.enter::<L>(rays, &entry),
+                    None => group.valid = 0,
+                }
+            }
+            if tree.root != Reference::NOTHING {
+                alone::trace::<L, T, ANY>(&Among { model, tree, transform, rays }, groups, courses);
+            }
+        }
+    }
+
     /// Whether it was worth it.
     #[inline(always)]
     fn trace<L: Lanes, T: Tier, const ANY: bool>(&mut self, rays: &[Ray<f64>; RAYS]) -> bool {
@@ -133,7 +182,7 @@ impl<'a> Packet<'a> {
                 return false;
             }
         }
-        self.pause = 1;
+        self.pause = (self.pause / 2).max(1);
         true
     }
 }

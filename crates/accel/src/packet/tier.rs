@@ -3,13 +3,16 @@
 //! Each lane does the operations of the tier's [`Kernel`] in their order: the same decisions and the same bits. What is
 //! rare is left to the kernel itself.
 
-use firsthit_geometry::{Real, triangle};
+use firsthit_geometry::{
+    Real,
+    triangle::{self, Weights},
+};
 use glam::{DVec3, Vec3};
 
 use super::group::{Doubles, Group};
 use super::vectors::{self, Vectors};
-use crate::kernel::{Fast, Kernel, MOST, Robust, SLIVER, STEEP, double};
-use crate::local::U;
+use crate::kernel::{Fast, Found, Kernel, MOST, Robust, SLIVER, STEEP, double, plane};
+use crate::local::{LocalRay, U};
 use crate::simd::{Eight, Lanes};
 use crate::wide::{Filter, Plain, Sheared};
 
@@ -46,6 +49,8 @@ pub(crate) trait Tier: Kernel {
     fn one<L: Lanes>(group: &Group, way: &Way, lane: usize) -> Self::One<L>;
     /// The same filter of eight rays for one triangle.
     fn candidates<L: Lanes>(group: &Group, way: &Way, triangle: &[Vec3; 3]) -> (u32, Known<L>);
+    /// The kernel's test of a triangle that passed the filter of one ray; `None` if only the kernel itself can tell.
+    fn meet_one(ray: &LocalRay, triangle: &[Vec3; 3], known: [f32; 3]) -> Option<Option<Found>>;
     /// The kernel's test of a triangle that passed the filter of the rays in the mask.
     fn meet<L: Lanes>(group: &Group, way: &Way, triangle: &[Vec3; 3], mask: u32, known: Known<L>) -> Met<L>;
 }
@@ -139,6 +144,12 @@ impl Tier for Robust {
     }
 
     #[inline(always)]
+    fn meet_one(ray: &LocalRay, triangle: &[Vec3; 3], known: [f32; 3]) -> Option<Option<Found>> {
+        let w = Weights::told::<true>(known)?;
+        Some(plane(triangle, ray, MOST, ray.t_min).map(|plane| plane.at(w.u, w.v)))
+    }
+
+    #[inline(always)]
     fn meet<L: Lanes>(group: &Group, way: &Way, triangle: &[Vec3; 3], mask: u32, [e0, e1, e2]: Known<L>) -> Met<L> {
         // `Weights::told`.
         let (zero, one) = (L::splat(0.0), L::splat(1.0));
@@ -228,6 +239,11 @@ impl Tier for Fast {
         let t = dot(e2, q).mul(inverse);
         let within = L::load(&group.start).le(t) & t.le(L::load(&group.end));
         (inside & within, [t, u.mul(inverse), v.mul(inverse)])
+    }
+
+    #[inline(always)]
+    fn meet_one(ray: &LocalRay, triangle: &[Vec3; 3], known: [f32; 3]) -> Option<Option<Found>> {
+        Some(Some(Self::found(known, ray, triangle)))
     }
 
     #[inline(always)]

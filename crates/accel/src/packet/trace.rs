@@ -8,9 +8,11 @@ use glam::{DVec3, Vec3};
 use super::frustum::{Frustum, latest};
 use super::group::Group;
 use super::tier::{Known, Tier, Way};
+use crate::kernel;
 use crate::layout::wide8::{Reference, Wide8};
 use crate::model::Model;
-use crate::simd::{Eight, Lanes, Stack, prefetch};
+use crate::offer::within_triangle;
+use crate::simd::{Eight, Lanes, Stack};
 use crate::wide::{Filter, WideTree};
 
 /// The mesh that a packet goes through, and its rays.
@@ -71,12 +73,7 @@ pub(super) fn trace<L: Lanes, T: Tier, const ANY: bool>(
             while coming != 0 {
                 let child = Reference(node.children[coming.trailing_zeros() as usize & 7]);
                 coming &= coming - 1;
-                if child.is_leaf() {
-                    prefetch(&tree.blocks[child.block()]);
-                    prefetch(&tree.blocks[child.block() + usize::from(child.lanes() > 0xf)]);
-                } else {
-                    prefetch(&tree.nodes[child.index()]);
-                }
+                tree.prefetch(child);
             }
             let sorted = enter.max(L::splat(0.0)).pack(&slots, hits);
             key = Some(if hits & (hits - 1) == 0 {
@@ -223,6 +220,42 @@ impl Group {
             }
         }
         shortened
+    }
+
+    /// [`Group::offer`] for one ray.
+    #[inline(always)]
+    pub(super) fn offer_alone<T: Tier, const ANY: bool>(
+        &mut self,
+        among: &Among<'_>,
+        index: usize,
+        lane: usize,
+        place: usize,
+        triangle: &[Vec3; 3],
+        known: [f32; 3],
+    ) -> bool {
+        let ray = self.local(lane, among.model.extent().parts().1);
+        let Some(found) = T::meet_one(&ray, triangle, known) else {
+            return self.offer_one::<T, ANY>(among, index, lane, place, triangle, known);
+        };
+        let Some(kernel::Found { t, u, v, normal, grazing, .. }) = found else { return false };
+        let t = if grazing && T::PADDED { within_triangle(ray, t, *triangle) } else { Some(t) };
+        // -0 becomes 0, as in a `Candidate`.
+        let Some(t) = t.map(|t| t * ray.t_unscale + 0.0) else { return false };
+        let (bit, t_max) = (1 << lane, self.t_max[lane]);
+        if !(self.t_min[lane] <= t && t <= t_max && t.is_finite()) || !among.model.has(place) {
+            return false;
+        }
+        if !ANY {
+            if t == t_max && self.hit & bit != 0 && !comes_first(among.model, place, self.place(lane)) {
+                return false;
+            }
+            (self.t_max[lane], self.u[lane], self.v[lane]) = (t, u, v);
+            self.place[lane] = f32::from_bits(place as u32);
+            (self.normal[0][lane], self.normal[1][lane], self.normal[2][lane]) = (normal.x, normal.y, normal.z);
+            self.end[lane] = self.box_t_of(lane);
+        }
+        self.hit |= bit;
+        true
     }
 
     /// [`Group::offer`] of what only the kernel can decide.

@@ -36,12 +36,13 @@ impl Scene {
         let n = rays.len().min(hits.len());
         let (rays, hits) = (&rays[..n], &mut hits[..n]);
         let (precision, guards) = (self.options().precision, self.options().guards);
+        let asked = AskClosest(self);
         match self.inner().only() {
             Some((level, only)) if precision == Precision::Fast => {
-                simd::run(level, ClosestInPackets::<Fast> { only, scene: self, rays, hits, kernel: PhantomData });
+                simd::run(level, InPackets { only, asked, rays, answers: hits, tier: PhantomData::<Fast> });
             }
             Some((level, only)) if precision == Precision::Robust && guards.contains(NEEDED) => {
-                simd::run(level, ClosestInPackets::<Robust> { only, scene: self, rays, hits, kernel: PhantomData });
+                simd::run(level, InPackets { only, asked, rays, answers: hits, tier: PhantomData::<Robust> });
             }
             _ => self.inner().by_kernel(ClosestHits { scene: self, rays, hits }),
         }
@@ -58,12 +59,13 @@ impl Scene {
         let n = rays.len().min(hits.len());
         let (rays, hits) = (&rays[..n], &mut hits[..n]);
         let (precision, guards) = (self.options().precision, self.options().guards);
+        let asked = AskAny;
         match self.inner().only() {
             Some((level, only)) if precision == Precision::Fast => {
-                simd::run(level, AnyInPackets::<Fast> { only, rays, hits, kernel: PhantomData });
+                simd::run(level, InPackets { only, asked, rays, answers: hits, tier: PhantomData::<Fast> });
             }
             Some((level, only)) if precision == Precision::Robust && guards.contains(NEEDED) => {
-                simd::run(level, AnyInPackets::<Robust> { only, rays, hits, kernel: PhantomData });
+                simd::run(level, InPackets { only, asked, rays, answers: hits, tier: PhantomData::<Robust> });
             }
             _ => self.inner().by_kernel(AnyHits { scene: self, rays, hits }),
         }
@@ -274,66 +276,107 @@ impl<T: WideTree, K: Kernel> Work for ClosestHitsOf<'_, T, K> {
     }
 }
 
-/// [`ClosestHits`] in the only instance, in packets where rays suit each other.
-struct ClosestInPackets<'a, T> {
-    only: Only<'a, Wide8>,
-    scene: &'a Scene,
-    rays: &'a [Ray<f64>],
-    hits: &'a mut [Option<Hit>],
-    kernel: PhantomData<T>,
+/// What is asked of each ray of a batch that goes in packets.
+trait Asked: Copy {
+    type Answer;
+    /// Of rays that go the same way; false if they do not after all, and nothing is known.
+    fn together<L: Lanes, T: Tier>(
+        self,
+        packet: &mut Packet<'_>,
+        rays: &[Ray<f64>; packet::RAYS],
+        to: &mut [Self::Answer],
+    ) -> bool;
+    /// Of eights of rays that need not have anything in common.
+    fn alone<L: Lanes, T: Tier>(self, packet: &mut Packet<'_>, rays: &[Ray<f64>], to: &mut [Self::Answer]);
+    fn one<L: Lanes, T: Tier>(self, only: &Only<'_, Wide8>, ray: &Ray<f64>) -> Self::Answer;
 }
 
-impl<T: Tier> Work for ClosestInPackets<'_, T> {
-    type Output = ();
+/// [`Scene::closest_hits`].
+#[derive(Clone, Copy)]
+struct AskClosest<'a>(&'a Scene);
+
+impl Asked for AskClosest<'_> {
+    type Answer = Option<Hit>;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) {
-        let Self { only, scene, mut rays, mut hits, .. } = self;
-        let mut packet = Packet::new(only.model, only.tree, only.transform);
-        while !rays.is_empty() {
-            let (now, later) = rays.split_at(rays.len().min(packet::RAYS));
-            let (now_hits, later_hits) = hits.split_at_mut(now.len());
-            (rays, hits) = (later, later_hits);
-            if let Some(together) = now.first_chunk()
-                && packet.suits(together)
-                && packet.closest::<L, T>(together, now_hits)
-            {
-                continue;
-            }
-            for (ray, hit) in now.iter().zip(now_hits) {
-                *hit = only.closest::<L, T>(scene, ray);
-            }
-        }
+    fn together<L: Lanes, T: Tier>(
+        self,
+        packet: &mut Packet<'_>,
+        rays: &[Ray<f64>; packet::RAYS],
+        to: &mut [Option<Hit>],
+    ) -> bool {
+        packet.closest::<L, T>(rays, to)
+    }
+
+    #[inline(always)]
+    fn alone<L: Lanes, T: Tier>(self, packet: &mut Packet<'_>, rays: &[Ray<f64>], to: &mut [Option<Hit>]) {
+        packet.closest_alone::<L, T>(rays, to);
+    }
+
+    #[inline(always)]
+    fn one<L: Lanes, T: Tier>(self, only: &Only<'_, Wide8>, ray: &Ray<f64>) -> Option<Hit> {
+        only.closest::<L, T>(self.0, ray)
     }
 }
 
-/// [`AnyHits`] in the only instance, likewise.
-struct AnyInPackets<'a, T> {
-    only: Only<'a, Wide8>,
-    rays: &'a [Ray<f64>],
-    hits: &'a mut [bool],
-    kernel: PhantomData<T>,
+/// [`Scene::any_hits`].
+#[derive(Clone, Copy)]
+struct AskAny;
+
+impl Asked for AskAny {
+    type Answer = bool;
+
+    #[inline(always)]
+    fn together<L: Lanes, T: Tier>(
+        self,
+        packet: &mut Packet<'_>,
+        rays: &[Ray<f64>; packet::RAYS],
+        to: &mut [bool],
+    ) -> bool {
+        packet.any::<L, T>(rays, to)
+    }
+
+    #[inline(always)]
+    fn alone<L: Lanes, T: Tier>(self, packet: &mut Packet<'_>, rays: &[Ray<f64>], to: &mut [bool]) {
+        packet.any_alone::<L, T>(rays, to);
+    }
+
+    #[inline(always)]
+    fn one<L: Lanes, T: Tier>(self, only: &Only<'_, Wide8>, ray: &Ray<f64>) -> bool {
+        only.any::<L, T>(ray)
+    }
 }
 
-impl<T: Tier> Work for AnyInPackets<'_, T> {
+/// A batch in the only instance: in packets where rays suit each other, else with some under way at a time.
+struct InPackets<'a, T, A: Asked> {
+    only: Only<'a, Wide8>,
+    asked: A,
+    rays: &'a [Ray<f64>],
+    answers: &'a mut [A::Answer],
+    tier: PhantomData<T>,
+}
+
+impl<T: Tier, A: Asked> Work for InPackets<'_, T, A> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        let Self { only, mut rays, mut hits, .. } = self;
+        let Self { only, asked, mut rays, mut answers, .. } = self;
         let mut packet = Packet::new(only.model, only.tree, only.transform);
         while !rays.is_empty() {
             let (now, later) = rays.split_at(rays.len().min(packet::RAYS));
-            let (now_hits, later_hits) = hits.split_at_mut(now.len());
-            (rays, hits) = (later, later_hits);
+            let (to, to_later) = answers.split_at_mut(now.len());
+            (rays, answers) = (later, to_later);
             if let Some(together) = now.first_chunk()
                 && packet.suits(together)
-                && packet.any::<L, T>(together, now_hits)
+                && asked.together::<L, T>(&mut packet, together, to)
             {
                 continue;
             }
-            for (ray, hit) in now.iter().zip(now_hits) {
-                *hit = only.any::<L, T>(ray);
+            let eights = now.len() / 8 * 8;
+            asked.alone::<L, T>(&mut packet, &now[..eights], &mut to[..eights]);
+            for (ray, to) in now[eights..].iter().zip(&mut to[eights..]) {
+                *to = asked.one::<L, T>(&only, ray);
             }
         }
     }

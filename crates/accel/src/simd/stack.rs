@@ -16,8 +16,14 @@ pub(crate) struct Stack<T> {
 
 impl<T: Copy> Stack<T> {
     #[inline(always)]
-    pub(crate) fn new() -> Self {
+    pub(crate) const fn new() -> Self {
         Self { entries: [const { MaybeUninit::uninit() }; SIZE], len: 0 }
+    }
+
+    /// Forgets all.
+    #[inline(always)]
+    pub(crate) fn clear(&mut self) {
+        self.len = 0;
     }
 
     /// Puts the first `n` (at most 8) of these keys on top, the last of them topmost.
@@ -42,46 +48,48 @@ impl<T: Copy> Stack<T> {
 }
 
 impl Stack<u64> {
-    /// Sorts the first `n` (2 to 8) of these keys, puts all but the smallest on top, smaller ones above, and returns the
-    /// smallest (the other way round if `reversed`). Few keys, as nearly always, are sorted without a detour through
-    /// memory.
+    /// Sorts the first `n` (1 to 8) of these keys, puts all but the smallest on top, smaller ones above, and returns the
+    /// smallest (the other way round if `reversed`).
     ///
     /// # Panics
     /// As [`Stack::push`].
     #[inline(always)]
-    pub(crate) fn push_all_but_nearest(&mut self, mut keys: [u64; 8], n: usize, reversed: bool) -> u64 {
+    pub(crate) fn push_all_but_nearest(&mut self, keys: [u64; 8], n: usize, reversed: bool) -> u64 {
         if reversed {
-            keys[..n.min(8)].iter_mut().for_each(|k| *k = !*k);
+            return self.push_all_but_farthest(keys, n);
         }
+        if n <= 4 { self.push_few(keys, n) } else { self.push_many(keys, n) }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn push_all_but_farthest(&mut self, mut keys: [u64; 8], n: usize) -> u64 {
+        keys[..n].sort_unstable();
+        self.push(&keys, n);
+        self.pop().unwrap_or(0)
+    }
+
+    /// One to four, sorted without a branch on how many.
+    #[inline(always)]
+    fn push_few(&mut self, keys: [u64; 8], n: usize) -> u64 {
+        assert!(self.len + 4 <= SIZE && (1..=4).contains(&n), "trees are not so deep");
         let [a, b, c, d, ..] = keys;
-        let nearest = match n {
-            2 => {
-                let (a, b) = order(a, b);
-                self.put([b], reversed);
-                a
-            }
-            3 => {
-                let (a, b) = order(a, b);
-                let (b, c) = order(b, c);
-                let (a, b) = order(a, b);
-                self.put([c, b], reversed);
-                a
-            }
-            4 => {
-                let ((a, b), (c, d)) = (order(a, b), order(c, d));
-                let ((a, c), (b, d)) = (order(a, c), order(b, d));
-                let (b, c) = order(b, c);
-                self.put([d, c, b], reversed);
-                a
-            }
-            _ => self.push_many(keys, n, reversed),
-        };
-        if reversed { !nearest } else { nearest }
+        // What is not there comes last.
+        let (b, c, d) = (if n > 1 { b } else { 0 }, if n > 2 { c } else { 0 }, if n > 3 { d } else { 0 });
+        let ((b, a), (d, c)) = (order(a, b), order(c, d));
+        let ((c, a), (d, b)) = (order(a, c), order(b, d));
+        let (c, b) = order(b, c);
+        for (slot, key) in self.entries[self.len..self.len + 4].iter_mut().zip([a, b, c, d]) {
+            slot.write(key);
+        }
+        self.len += n - 1;
+        // SAFETY: `n` is one to four, and four entries were written just now.
+        unsafe { self.entries[self.len].assume_init() }
     }
 
     /// Any number. Inlined too: a call would make the caller keep everything in memory.
     #[inline(always)]
-    fn push_many(&mut self, keys: [u64; 8], n: usize, reversed: bool) -> u64 {
+    fn push_many(&mut self, keys: [u64; 8], n: usize) -> u64 {
         assert!(self.len + 8 <= SIZE, "trees are not so deep");
         let slots = &mut self.entries[self.len..self.len + 8];
         // Insertion, the largest lowest.
@@ -101,27 +109,8 @@ impl Stack<u64> {
             slots[k].write(key);
             count += 1;
         }
-        if reversed {
-            for slot in &mut slots[..count] {
-                // SAFETY: the slots below `count` are written.
-                slot.write(!unsafe { slot.assume_init() });
-            }
-        }
         self.len += count;
-        match self.pop() {
-            Some(nearest) if reversed => !nearest,
-            Some(nearest) => nearest,
-            None => 0,
-        }
-    }
-
-    #[inline(always)]
-    fn put<const N: usize>(&mut self, keys: [u64; N], reversed: bool) {
-        assert!(self.len + N <= SIZE, "trees are not so deep");
-        for (slot, key) in self.entries[self.len..self.len + N].iter_mut().zip(keys) {
-            slot.write(if reversed { !key } else { key });
-        }
-        self.len += N;
+        self.pop().unwrap_or(0)
     }
 }
 
@@ -138,7 +127,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_nearest_comes_first_then_the_others(keys in prop::array::uniform8(any::<u64>()), n in 2usize..=8) {
+        fn the_nearest_comes_first_then_the_others(keys in prop::array::uniform8(any::<u64>()), n in 1usize..=8) {
             let mut sorted = keys[..n].to_vec();
             sorted.sort_unstable();
             let mut stack = Stack::new();

@@ -31,21 +31,60 @@ pub(crate) struct Axis<L> {
     pub(crate) far: L,
 }
 
-impl<L: Lanes> Boxes<L> {
+/// What a ray's [`Boxes`] are made of.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct BoxSetup {
+    inverse: [f32; 3],
+    near: [f32; 3],
+    far: [f32; 3],
+    /// 1 where the ray goes down, and so enters through the upper planes.
+    side: [u8; 3],
+}
+
+impl BoxSetup {
     /// For boxes that are to be met as if larger by `delta` in each axis.
     #[inline(always)]
-    pub(crate) fn new(origin: Vec3, direction: Vec3, delta: f32) -> Self {
+    pub(crate) fn new<L: Lanes>(origin: Vec3, direction: Vec3, delta: f32) -> Self {
         // All axes at once; the other lanes are of no use.
         let origin = L::load(&[origin.x, origin.y, origin.z, 0.0, 0.0, 0.0, 0.0, 0.0]);
         let direction = L::load(&[direction.x, direction.y, direction.z, 1.0, 1.0, 1.0, 1.0, 1.0]);
         let inverse = L::splat(1.0).div(direction.abs().max(L::splat(SMALLEST)).turned_by(direction));
         let out = L::splat(delta).turned_by(direction);
         let (near, far) = (origin.add(out).mul(inverse).store(), origin.sub(out).mul(inverse).store());
-        let (inverse, negative) = (inverse.store(), direction.negative() as usize);
-        // Going down, the ray enters through the upper planes.
-        let side = [negative & 1, negative >> 1 & 1, negative >> 2 & 1];
-        let axis = AxisOf { inverse: &inverse, near: &near, far: &far, side: &side };
-        Self { axes: [axis.of(0), axis.of(1), axis.of(2)] }
+        let (inverse, negative) = (inverse.store(), direction.negative() as u8);
+        Self {
+            inverse: [inverse[0], inverse[1], inverse[2]],
+            near: [near[0], near[1], near[2]],
+            far: [far[0], far[1], far[2]],
+            side: [negative & 1, negative >> 1 & 1, negative >> 2 & 1],
+        }
+    }
+
+    #[inline(always)]
+    fn axis<L: Lanes>(&self, k: usize) -> Axis<L> {
+        let side = usize::from(self.side[k] & 1);
+        Axis {
+            entry: Row::new(Node::row(k, side)),
+            exit: Row::new(Node::row(k, 1 - side)),
+            inverse: L::splat(self.inverse[k]),
+            near: L::splat(self.near[k]),
+            far: L::splat(self.far[k]),
+        }
+    }
+}
+
+impl<L: Lanes> Boxes<L> {
+    #[inline(always)]
+    pub(crate) fn new(setup: &BoxSetup) -> Self {
+        Self { axes: [setup.axis(0), setup.axis(1), setup.axis(2)] }
+    }
+
+    /// Of each axis the reciprocal, the origin times that for near and far planes, and whether (1) the ray goes down.
+    #[inline(always)]
+    pub(crate) fn known(axes: [(f32, [f32; 2], u32); 3]) -> Self {
+        let [(ix, [nx, fx], sx), (iy, [ny, fy], sy), (iz, [nz, fz], sz)] = axes;
+        let side = [sx as u8, sy as u8, sz as u8];
+        Self::new(&BoxSetup { inverse: [ix, iy, iz], near: [nx, ny, nz], far: [fx, fy, fz], side })
     }
 
     /// Which children the ray meets within `[t_min, t_max]`, and where it enters them.
@@ -55,28 +94,6 @@ impl<L: Lanes> Boxes<L> {
         let enter = x.0.max(y.0).max(z.0.max(t_min));
         let leave = x.1.min(y.1).min(z.1.min(t_max));
         (node.there(enter.le(leave)), enter)
-    }
-}
-
-/// What one [`Axis`] is made of. (A closure could not be told to be inlined.)
-struct AxisOf<'a> {
-    inverse: &'a [f32; 8],
-    near: &'a [f32; 8],
-    far: &'a [f32; 8],
-    side: &'a [usize; 3],
-}
-
-impl AxisOf<'_> {
-    #[inline(always)]
-    fn of<L: Lanes>(&self, k: usize) -> Axis<L> {
-        let side = self.side[k];
-        Axis {
-            entry: Row::new(Node::row(k, side)),
-            exit: Row::new(Node::row(k, 1 - side)),
-            inverse: L::splat(self.inverse[k]),
-            near: L::splat(self.near[k]),
-            far: L::splat(self.far[k]),
-        }
     }
 }
 
@@ -102,7 +119,7 @@ mod tests {
         fn run<L: Lanes>(self) -> u32 {
             // 4u|o|, and 4u of the farthest that a plane may be.
             let delta = if self.padded { (self.origin.abs().max_element() + 50.0) * 2.4e-7 } else { 0.0 };
-            let boxes = Boxes::<L>::new(self.origin, self.direction, delta);
+            let boxes = Boxes::<L>::new(&BoxSetup::new::<L>(self.origin, self.direction, delta));
             let (t_min, t_max) = (L::splat(self.t_min), L::splat(f32::INFINITY));
             let compact = boxes.test(&compact8::Node::new(self.node), t_min, t_max).0;
             let wide = boxes.test(self.node, t_min, t_max).0;

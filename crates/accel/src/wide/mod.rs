@@ -8,24 +8,13 @@ use core::ops::ControlFlow;
 
 use glam::Vec3;
 
-pub(crate) use boxes::{Axis, Boxes, SMALLEST};
+pub(crate) use boxes::{Axis, BoxSetup, Boxes, SMALLEST};
 pub(crate) use tree::{BoxNode, Leaf, WideTree};
 pub(crate) use triangles::{Either, Filter, Margin, Plain, Sheared};
 
 use crate::layout::wide8::Reference;
 use crate::simd::{Lanes, Stack};
 use crate::stats::Probe;
-
-/// A ray among boxes: how they are to be met.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct BoxRay {
-    pub(crate) origin: Vec3,
-    pub(crate) direction: Vec3,
-    /// Boxes are met as if larger by this in each axis.
-    pub(crate) delta: f32,
-    pub(crate) t_min: f32,
-    pub(crate) t_max: f32,
-}
 
 /// Tests triangles. A trait and not a closure, which could not be told to be inlined: into what is compiled for the
 /// level, or every call would save and load all registers.
@@ -48,7 +37,8 @@ pub(crate) trait Visit<P> {
 #[inline(always)]
 pub(crate) fn traverse<L: Lanes, T: WideTree, F: Filter<L>, P: Probe, const ORDERED: bool>(
     tree: &T,
-    ray: &BoxRay,
+    boxes: &Boxes<L>,
+    [t_min, mut t_max]: [f32; 2],
     filter: &F,
     probe: &mut P,
     visitor: &mut impl Visit<P>,
@@ -56,11 +46,9 @@ pub(crate) fn traverse<L: Lanes, T: WideTree, F: Filter<L>, P: Probe, const ORDE
     if tree.root() == Reference::NOTHING {
         return ControlFlow::Continue(());
     }
-    let boxes = Boxes::<L>::new(ray.origin, ray.direction, ray.delta);
-    let t_min = L::splat(ray.t_min);
-    let mut t_max = ray.t_max;
+    let start = L::splat(t_min);
     let mut ends = L::splat(t_max);
-    let mut interval = filter.interval(ray.t_min, t_max);
+    let mut interval = filter.interval(t_min, t_max);
     // Nearest first, or without distances.
     let (mut keys, mut children) = (Stack::<u64>::new(), Stack::<u32>::new());
     let mut current = tree.root();
@@ -68,7 +56,7 @@ pub(crate) fn traverse<L: Lanes, T: WideTree, F: Filter<L>, P: Probe, const ORDE
         while !current.is_leaf() {
             let node = tree.node(current);
             let below = node.children();
-            let (mut hits, enter) = boxes.test(node, t_min, ends);
+            let (mut hits, enter) = boxes.test(node, start, ends);
             probe.boxes(8);
             if !probe.prunes() {
                 hits = below.iter().enumerate().fold(0, |m, (k, &c)| m | u32::from(c != u32::MAX) << k);
@@ -111,7 +99,7 @@ pub(crate) fn traverse<L: Lanes, T: WideTree, F: Filter<L>, P: Probe, const ORDE
                     if let Some(end) = visitor.visit(place, &triangle, known, probe)? {
                         t_max = end;
                         ends = L::splat(end);
-                        interval = filter.interval(ray.t_min, end);
+                        interval = filter.interval(t_min, end);
                     }
                 }
             }
