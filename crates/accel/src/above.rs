@@ -299,13 +299,13 @@ impl Work for Walk<'_> {
                         continue;
                     }
                     n => {
-                        current = stack.push_all_but_nearest(keys, n, reversed) as u32;
+                        current = stack.top().push_all_but_nearest(keys, n, reversed) as u32;
                         continue;
                     }
                 }
             }
             loop {
-                let Some(key) = stack.pop() else { return ControlFlow::Continue(()) };
+                let Some(key) = stack.top().pop() else { return ControlFlow::Continue(()) };
                 // Any end of an interval is beyond what does not tell distances.
                 let enter = if asked.ordered { f32::from_bits((key >> 32) as u32) } else { f32::NEG_INFINITY };
                 if !prunes || enter <= t_max.max(0.0) {

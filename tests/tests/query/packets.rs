@@ -118,7 +118,8 @@ fn rays_that_have_nothing_in_common() {
         })
         .collect();
     let turned = DAffine3::from_rotation_y(0.4) * DAffine3::from_scale(DVec3::new(1.0, 2.0, 0.5));
-    for (name, mesh) in [("ball", icosphere(5)), ("one leaf", soup(&mut Rng(6), 6)), ("soup", soup(&mut Rng(5), 3000))] {
+    for (name, mesh) in [("ball", icosphere(5)), ("one leaf", soup(&mut Rng(6), 6)), ("soup", soup(&mut Rng(5), 3000))]
+    {
         for precision in Precision::ALL {
             for simd in Level::ALL {
                 let options = BuildOptions { precision, simd, ..BuildOptions::default() };

@@ -8,8 +8,8 @@
 use super::group::Group;
 use super::tier::{Tier, Way};
 use super::trace::Among;
-use crate::layout::wide8::Reference;
-use crate::simd::{Lanes, Stack};
+use crate::layout::wide8::{Reference, Wide8};
+use crate::simd::{Lanes, Stacks};
 use crate::wide::{BoxNode, Filter, Leaf, WideTree};
 
 /// Groups under way at a time.
@@ -19,20 +19,17 @@ pub(super) const GROUPS: usize = 4;
 const RAYS: usize = 8 * GROUPS;
 
 /// Where the rays under way are, and what is left for them to visit: keys if near hits are to be found first, else children.
-pub(super) struct Courses {
+pub(crate) struct Courses {
     current: [Reference; RAYS],
-    keys: [Stack<u64>; RAYS],
-    children: [Stack<u32>; RAYS],
+    keys: Stacks<u64, RAYS>,
+    children: Stacks<u32, RAYS>,
 }
 
 impl Courses {
-    #[inline(always)]
-    pub(super) fn new() -> Self {
-        Self {
-            current: [Reference::NOTHING; RAYS],
-            keys: [const { Stack::new() }; RAYS],
-            children: [const { Stack::new() }; RAYS],
-        }
+    /// For a tree.
+    pub(crate) fn new(tree: &Wide8) -> Self {
+        let (keys, children) = (Stacks::new(tree.depth()), Stacks::new(tree.depth()));
+        Self { current: [Reference::NOTHING; RAYS], keys, children }
     }
 }
 
@@ -82,13 +79,13 @@ pub(super) fn trace<L: Lanes, T: Tier, const ANY: bool>(
     let tree = among.tree;
     let large = tree.nodes.len() > 1 << 14;
     let mut now = Ahead { nodes: List::EMPTY, leaves: List::EMPTY };
+    courses.keys.clear();
+    courses.children.clear();
     for (index, group) in groups.iter_mut().enumerate() {
         group.part::<L>();
         for lane in 0..8 {
             let ray = index * 8 + lane;
             courses.current[ray] = tree.root;
-            courses.keys[ray].clear();
-            courses.children[ray].clear();
             if group.awake >> lane & 1 == 1 {
                 now.go(ray, tree.root);
             }
@@ -121,10 +118,10 @@ pub(super) fn trace<L: Lanes, T: Tier, const ANY: bool>(
                 let Some(at) = pop::<ANY>(courses, ray, groups[ray / 8].end[ray % 8]) else { continue };
                 at
             } else if ANY {
-                courses.children[ray].push(&words[k], n - 1);
+                courses.children.top(ray).push(&words[k], n - 1);
                 Reference(words[k][(n - 1) & 7])
             } else {
-                Reference(courses.keys[ray].push_all_but_nearest(keys[k], n, false) as u32)
+                Reference(courses.keys.top(ray).push_all_but_nearest(keys[k], n, false) as u32)
             };
             if large {
                 tree.prefetch(at);
@@ -182,10 +179,10 @@ pub(super) fn trace<L: Lanes, T: Tier, const ANY: bool>(
 #[inline(always)]
 fn pop<const ANY: bool>(courses: &mut Courses, ray: usize, end: f32) -> Option<Reference> {
     if ANY {
-        return courses.children[ray].pop().map(Reference);
+        return courses.children.top(ray).pop().map(Reference);
     }
     loop {
-        let key = courses.keys[ray].pop()?;
+        let key = courses.keys.top(ray).pop()?;
         if f32::from_bits((key >> 32) as u32) <= end.max(0.0) {
             return Some(Reference(key as u32));
         }

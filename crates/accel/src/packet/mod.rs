@@ -14,6 +14,7 @@ mod vectors;
 use firsthit_geometry::{Ray, transform::Transform};
 use glam::DVec3;
 
+pub(crate) use alone::Courses;
 pub(crate) use tier::Tier;
 
 use crate::layout::wide8::{Reference, Wide8};
@@ -43,7 +44,6 @@ pub(crate) struct Packet<'a> {
     tree: &'a Wide8,
     transform: &'a Transform,
     groups: [Group; GROUPS],
-    courses: alone::Courses,
     /// How many packets are not tried, and how many will not be after the next that visits too much.
     paused: u32,
     pause: u32,
@@ -53,15 +53,7 @@ impl<'a> Packet<'a> {
     /// For the only instance of a scene.
     #[inline(always)]
     pub(crate) fn new(model: &'a Model, tree: &'a Wide8, transform: &'a Transform) -> Self {
-        Self {
-            model,
-            tree,
-            transform,
-            groups: [Group::default(); GROUPS],
-            courses: alone::Courses::new(),
-            paused: 0,
-            pause: 1,
-        }
+        Self { model, tree, transform, groups: [Group::default(); GROUPS], paused: 0, pause: 1 }
     }
 
     /// Whether rays may well go together: seen from a few of them and from the packets before, which is all that rays pay
@@ -110,8 +102,13 @@ impl<'a> Packet<'a> {
 
     /// The nearest hit of each ray, whatever way they go.
     #[inline(always)]
-    pub(crate) fn closest_alone<L: Lanes, T: Tier>(&mut self, rays: &[Ray<f64>], hits: &mut [Option<Hit>]) {
-        self.alone::<L, T, false>(rays);
+    pub(crate) fn closest_alone<L: Lanes, T: Tier>(
+        &mut self,
+        rays: &[Ray<f64>],
+        courses: &mut Courses,
+        hits: &mut [Option<Hit>],
+    ) {
+        self.alone::<L, T, false>(rays, courses);
         for (group, hits) in self.groups.iter_mut().zip(hits.as_chunks_mut::<8>().0) {
             group.finish::<L>(self.model, self.transform, hits);
         }
@@ -119,8 +116,8 @@ impl<'a> Packet<'a> {
 
     /// Whether each ray hits anything, whatever way they go.
     #[inline(always)]
-    pub(crate) fn any_alone<L: Lanes, T: Tier>(&mut self, rays: &[Ray<f64>], hits: &mut [bool]) {
-        self.alone::<L, T, true>(rays);
+    pub(crate) fn any_alone<L: Lanes, T: Tier>(&mut self, rays: &[Ray<f64>], courses: &mut Courses, hits: &mut [bool]) {
+        self.alone::<L, T, true>(rays, courses);
         for (group, hits) in self.groups.iter().zip(hits.as_chunks_mut::<8>().0) {
             for (lane, hit) in hits.iter_mut().enumerate() {
                 *hit = group.hit >> lane & 1 == 1;
@@ -130,8 +127,8 @@ impl<'a> Packet<'a> {
 
     /// Eights of rays, as many as a packet holds.
     #[inline(always)]
-    fn alone<L: Lanes, T: Tier, const ANY: bool>(&mut self, rays: &[Ray<f64>]) {
-        let Self { model, tree, transform, groups, courses, .. } = self;
+    fn alone<L: Lanes, T: Tier, const ANY: bool>(&mut self, rays: &[Ray<f64>], courses: &mut Courses) {
+        let Self { model, tree, transform, groups, .. } = self;
         let rays = rays.as_chunks::<8>().0;
         let entry = Entry { transform, extent: model.extent(), padded: T::PADDED };
         for (rays, groups) in rays.chunks(alone::GROUPS).zip(groups.as_chunks_mut::<{ alone::GROUPS }>().0) {

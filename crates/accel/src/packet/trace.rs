@@ -79,11 +79,11 @@ pub(super) fn trace<L: Lanes, T: Tier, const ANY: bool>(
             key = Some(if hits & (hits - 1) == 0 {
                 sorted[0]
             } else {
-                keys.push_all_but_nearest(sorted, hits.count_ones() as usize, false)
+                keys.top().push_all_but_nearest(sorted, hits.count_ones() as usize, false)
             });
         }
         current = loop {
-            let Some(next) = key.or_else(|| keys.pop()) else { return ControlFlow::Continue(()) };
+            let Some(next) = key.or_else(|| keys.top().pop()) else { return ControlFlow::Continue(()) };
             key = None;
             if f32::from_bits((next >> 32) as u32) > end.max(0.0) {
                 continue;

@@ -11,7 +11,7 @@ use crate::kernel::{Double, Exact, Fast, Guarded, Kernel, Robust};
 use crate::layout::compact8::Compact8;
 use crate::layout::wide8::Wide8;
 use crate::model::Model;
-use crate::packet::{self, Packet, Tier};
+use crate::packet::{self, Courses, Packet, Tier};
 use crate::scene::{Inner, is_interval};
 use crate::simd::{self, Available, Lanes, Work};
 use crate::stats::Off;
@@ -287,7 +287,13 @@ trait Asked: Copy {
         to: &mut [Self::Answer],
     ) -> bool;
     /// Of eights of rays that need not have anything in common.
-    fn alone<L: Lanes, T: Tier>(self, packet: &mut Packet<'_>, rays: &[Ray<f64>], to: &mut [Self::Answer]);
+    fn alone<L: Lanes, T: Tier>(
+        self,
+        packet: &mut Packet<'_>,
+        courses: &mut Courses,
+        rays: &[Ray<f64>],
+        to: &mut [Self::Answer],
+    );
     fn one<L: Lanes, T: Tier>(self, only: &Only<'_, Wide8>, ray: &Ray<f64>) -> Self::Answer;
 }
 
@@ -309,8 +315,14 @@ impl Asked for AskClosest<'_> {
     }
 
     #[inline(always)]
-    fn alone<L: Lanes, T: Tier>(self, packet: &mut Packet<'_>, rays: &[Ray<f64>], to: &mut [Option<Hit>]) {
-        packet.closest_alone::<L, T>(rays, to);
+    fn alone<L: Lanes, T: Tier>(
+        self,
+        packet: &mut Packet<'_>,
+        courses: &mut Courses,
+        rays: &[Ray<f64>],
+        to: &mut [Option<Hit>],
+    ) {
+        packet.closest_alone::<L, T>(rays, courses, to);
     }
 
     #[inline(always)]
@@ -337,8 +349,14 @@ impl Asked for AskAny {
     }
 
     #[inline(always)]
-    fn alone<L: Lanes, T: Tier>(self, packet: &mut Packet<'_>, rays: &[Ray<f64>], to: &mut [bool]) {
-        packet.any_alone::<L, T>(rays, to);
+    fn alone<L: Lanes, T: Tier>(
+        self,
+        packet: &mut Packet<'_>,
+        courses: &mut Courses,
+        rays: &[Ray<f64>],
+        to: &mut [bool],
+    ) {
+        packet.any_alone::<L, T>(rays, courses, to);
     }
 
     #[inline(always)]
@@ -362,7 +380,15 @@ impl<T: Tier, A: Asked> Work for InPackets<'_, T, A> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
         let Self { only, asked, mut rays, mut answers, .. } = self;
+        // Less than a group: it would not pay to make room.
+        if rays.len() < 8 {
+            for (ray, to) in rays.iter().zip(answers) {
+                *to = asked.one::<L, T>(&only, ray);
+            }
+            return;
+        }
         let mut packet = Packet::new(only.model, only.tree, only.transform);
+        let mut courses = Courses::new(only.tree);
         while !rays.is_empty() {
             let (now, later) = rays.split_at(rays.len().min(packet::RAYS));
             let (to, to_later) = answers.split_at_mut(now.len());
@@ -374,7 +400,7 @@ impl<T: Tier, A: Asked> Work for InPackets<'_, T, A> {
                 continue;
             }
             let eights = now.len() / 8 * 8;
-            asked.alone::<L, T>(&mut packet, &now[..eights], &mut to[..eights]);
+            asked.alone::<L, T>(&mut packet, &mut courses, &now[..eights], &mut to[..eights]);
             for (ray, to) in now[eights..].iter().zip(&mut to[eights..]) {
                 *to = asked.one::<L, T>(&only, ray);
             }

@@ -18,7 +18,7 @@ mod ymm;
 
 pub(crate) use eight::{Eight, Packed};
 pub(crate) use portable::Portable;
-pub(crate) use stack::Stack;
+pub(crate) use stack::{Stack, Stacks};
 
 /// Which instructions the queries of a scene use. Answers do not depend on it (of [`Precision::Fast`], those at the
 /// very edges of boxes may).

@@ -16,45 +16,84 @@ pub(crate) struct Stack<T> {
 
 impl<T: Copy> Stack<T> {
     #[inline(always)]
-    pub(crate) const fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self { entries: [const { MaybeUninit::uninit() }; SIZE], len: 0 }
     }
 
-    /// Forgets all.
     #[inline(always)]
-    pub(crate) fn clear(&mut self) {
-        self.len = 0;
+    pub(crate) fn top(&mut self) -> Top<'_, T> {
+        Top { entries: &mut self.entries, len: &mut self.len }
+    }
+}
+
+/// Several, no larger than a tree's depth asks for.
+pub(crate) struct Stacks<T, const N: usize> {
+    entries: Box<[MaybeUninit<T>]>,
+    /// Entries of each.
+    room: usize,
+    len: [usize; N],
+}
+
+impl<T: Copy, const N: usize> Stacks<T, N> {
+    /// For trees of so many levels.
+    pub(crate) fn new(depth: u32) -> Self {
+        let room = 7 * depth as usize + 8;
+        Self { entries: Box::new_uninit_slice(N * room), room, len: [0; N] }
     }
 
+    /// Empties all.
+    #[inline(always)]
+    pub(crate) fn clear(&mut self) {
+        self.len = [0; N];
+    }
+
+    /// Of one of them.
+    ///
+    /// # Panics
+    /// If there is no such stack.
+    #[inline(always)]
+    pub(crate) fn top(&mut self, which: usize) -> Top<'_, T> {
+        let from = which * self.room;
+        Top { entries: &mut self.entries[from..from + self.room], len: &mut self.len[which] }
+    }
+}
+
+/// Where a stack grows. What lies below `len` was written.
+pub(crate) struct Top<'a, T> {
+    entries: &'a mut [MaybeUninit<T>],
+    len: &'a mut usize,
+}
+
+impl<T: Copy> Top<'_, T> {
     /// Puts the first `n` (at most 8) of these keys on top, the last of them topmost.
     ///
     /// # Panics
     /// If the stack is full, which no tree of bounded depth brings about.
     #[inline(always)]
-    pub(crate) fn push(&mut self, keys: &[T; 8], n: usize) {
-        assert!(self.len + 8 <= SIZE && n <= 8, "trees are not so deep");
-        for (slot, key) in self.entries[self.len..self.len + 8].iter_mut().zip(keys) {
+    pub(crate) fn push(self, keys: &[T; 8], n: usize) {
+        assert!(*self.len + 8 <= self.entries.len() && n <= 8, "trees are not so deep");
+        for (slot, key) in self.entries[*self.len..*self.len + 8].iter_mut().zip(keys) {
             slot.write(*key);
         }
-        self.len += n;
+        *self.len += n;
     }
 
     #[inline(always)]
-    pub(crate) fn pop(&mut self) -> Option<T> {
-        self.len = self.len.checked_sub(1)?;
-        // SAFETY: every entry below `len` was written by `push`, and `len` is below SIZE.
-        Some(unsafe { self.entries.get_unchecked(self.len).assume_init() })
+    pub(crate) fn pop(self) -> Option<T> {
+        *self.len = self.len.checked_sub(1)?;
+        // SAFETY: every entry below `len` was written by `push`, and `len` is below what there is room for.
+        Some(unsafe { self.entries.get_unchecked(*self.len).assume_init() })
     }
 }
 
-impl Stack<u64> {
+impl Top<'_, u64> {
     /// Sorts the first `n` (1 to 8) of these keys, puts all but the smallest on top, smaller ones above, and returns the
     /// smallest (the other way round if `reversed`).
     ///
     /// # Panics
-    /// As [`Stack::push`].
+    /// As [`Top::push`].
     #[inline(always)]
-    pub(crate) fn push_all_but_nearest(&mut self, keys: [u64; 8], n: usize, reversed: bool) -> u64 {
+    pub(crate) fn push_all_but_nearest(self, keys: [u64; 8], n: usize, reversed: bool) -> u64 {
         if reversed {
             return self.push_all_but_farthest(keys, n);
         }
@@ -63,35 +102,38 @@ impl Stack<u64> {
 
     #[cold]
     #[inline(never)]
-    fn push_all_but_farthest(&mut self, mut keys: [u64; 8], n: usize) -> u64 {
+    fn push_all_but_farthest(self, mut keys: [u64; 8], n: usize) -> u64 {
         keys[..n].sort_unstable();
-        self.push(&keys, n);
-        self.pop().unwrap_or(0)
+        let Self { entries, len } = self;
+        Top { entries, len }.push(&keys, n);
+        Top { entries, len }.pop().unwrap_or(0)
     }
 
     /// One to four, sorted without a branch on how many.
     #[inline(always)]
-    fn push_few(&mut self, keys: [u64; 8], n: usize) -> u64 {
-        assert!(self.len + 4 <= SIZE && (1..=4).contains(&n), "trees are not so deep");
+    fn push_few(self, keys: [u64; 8], n: usize) -> u64 {
+        let len = *self.len;
+        assert!(len + 4 <= self.entries.len() && (1..=4).contains(&n), "trees are not so deep");
         let [a, b, c, d, ..] = keys;
         // What is not there comes last.
         let (b, c, d) = (if n > 1 { b } else { 0 }, if n > 2 { c } else { 0 }, if n > 3 { d } else { 0 });
         let ((b, a), (d, c)) = (order(a, b), order(c, d));
         let ((c, a), (d, b)) = (order(a, c), order(b, d));
         let (c, b) = order(b, c);
-        for (slot, key) in self.entries[self.len..self.len + 4].iter_mut().zip([a, b, c, d]) {
+        for (slot, key) in self.entries[len..len + 4].iter_mut().zip([a, b, c, d]) {
             slot.write(key);
         }
-        self.len += n - 1;
+        *self.len = len + n - 1;
         // SAFETY: `n` is one to four, and four entries were written just now.
-        unsafe { self.entries[self.len].assume_init() }
+        unsafe { self.entries[len + n - 1].assume_init() }
     }
 
     /// Any number. Inlined too: a call would make the caller keep everything in memory.
     #[inline(always)]
-    fn push_many(&mut self, keys: [u64; 8], n: usize) -> u64 {
-        assert!(self.len + 8 <= SIZE, "trees are not so deep");
-        let slots = &mut self.entries[self.len..self.len + 8];
+    fn push_many(self, keys: [u64; 8], n: usize) -> u64 {
+        let len = *self.len;
+        assert!(len + 8 <= self.entries.len(), "trees are not so deep");
+        let slots = &mut self.entries[len..len + 8];
         // Insertion, the largest lowest.
         let mut count = 0;
         while count < n.min(8) {
@@ -109,7 +151,7 @@ impl Stack<u64> {
             slots[k].write(key);
             count += 1;
         }
-        self.len += count;
+        *self.len += count;
         self.pop().unwrap_or(0)
     }
 }
@@ -131,11 +173,11 @@ mod tests {
             let mut sorted = keys[..n].to_vec();
             sorted.sort_unstable();
             let mut stack = Stack::new();
-            let mut got = vec![stack.push_all_but_nearest(keys, n, false)];
-            got.extend(core::iter::from_fn(|| stack.pop()));
+            let mut got = vec![stack.top().push_all_but_nearest(keys, n, false)];
+            got.extend(core::iter::from_fn(|| stack.top().pop()));
             prop_assert_eq!(&got, &sorted);
-            got = vec![stack.push_all_but_nearest(keys, n, true)];
-            got.extend(core::iter::from_fn(|| stack.pop()));
+            got = vec![stack.top().push_all_but_nearest(keys, n, true)];
+            got.extend(core::iter::from_fn(|| stack.top().pop()));
             sorted.reverse();
             prop_assert_eq!(&got, &sorted);
         }
@@ -148,15 +190,15 @@ mod tests {
         for level in 0..u64::from(MAX_DEPTH) {
             let keys = core::array::from_fn(|k| level * 8 + k as u64);
             let n = if level % 3 == 0 { 7 } else { level as usize % 8 };
-            stack.push(&keys, n);
+            stack.top().push(&keys, n);
             twin.extend_from_slice(&keys[..n]);
             if level % 4 == 1 {
-                assert_eq!(stack.pop(), twin.pop());
+                assert_eq!(stack.top().pop(), twin.pop());
             }
         }
         while let Some(key) = twin.pop() {
-            assert_eq!(stack.pop(), Some(key));
+            assert_eq!(stack.top().pop(), Some(key));
         }
-        assert_eq!(stack.pop(), None);
+        assert_eq!(stack.top().pop(), None);
     }
 }

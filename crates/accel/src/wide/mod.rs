@@ -73,14 +73,15 @@ pub(crate) fn traverse<L: Lanes, T: WideTree, F: Filter<L>, P: Probe, const ORDE
                 // Keys are ordered by the bits of distances, which must not be negative; what begins before 0 is all
                 // alike, and never beyond the end.
                 let hit = enter.max(L::splat(0.0)).pack(below, hits);
-                current =
-                    Reference(keys.push_all_but_nearest(hit, hits.count_ones() as usize, probe.reversed()) as u32);
+                current = Reference(
+                    keys.top().push_all_but_nearest(hit, hits.count_ones() as usize, probe.reversed()) as u32
+                );
             } else {
                 // The largest is the last.
                 let last = 31 - hits.leading_zeros();
                 current = Reference(below[last as usize & 7]);
                 let rest = hits ^ 1 << last;
-                children.push(&L::pack_words(below, rest), rest.count_ones() as usize);
+                children.top().push(&L::pack_words(below, rest), rest.count_ones() as usize);
             }
         }
         if current != Reference::NOTHING {
@@ -105,12 +106,12 @@ pub(crate) fn traverse<L: Lanes, T: WideTree, F: Filter<L>, P: Probe, const ORDE
             }
         }
         if !ORDERED {
-            let Some(child) = children.pop() else { return ControlFlow::Continue(()) };
+            let Some(child) = children.top().pop() else { return ControlFlow::Continue(()) };
             current = Reference(child);
             continue;
         }
         loop {
-            let Some(key) = keys.pop() else { return ControlFlow::Continue(()) };
+            let Some(key) = keys.top().pop() else { return ControlFlow::Continue(()) };
             if !probe.prunes() || f32::from_bits((key >> 32) as u32) <= t_max.max(0.0) {
                 current = Reference(key as u32);
                 break;
