@@ -200,7 +200,7 @@ pub(crate) struct QualityArgs {
     #[arg(long, value_name = "N", default_value = "0")]
     pub(crate) seed: u64,
 
-    /// How light is computed: path (as auto), whitted, direct, ao, or the name of an --aov as the picture
+    /// How light is computed: path (as auto), light (paths from the lights), whitted, direct, ao, or the name of an --aov as the picture
     #[arg(long, value_name = "NAME", default_value = "auto", value_parser = values::integrator)]
     pub(crate) integrator: IntegratorChoice,
 
@@ -263,6 +263,19 @@ pub(crate) struct CameraArgs {
     /// Parallel projection
     #[arg(long)]
     pub(crate) camera_orthographic: bool,
+
+    /// Diameter of its lens, in world units: what is not in focus is blurred; 0 is a pinhole [default: the scene file's]
+    #[arg(long, value_name = "WIDTH", value_parser = values::number)]
+    pub(crate) aperture: Option<f64>,
+
+    /// Into how many steps the time is cut while the shutter is open, where something moves
+    #[arg(long, value_name = "N", default_value = "16", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub(crate) motion_steps: u32,
+
+    /// How far away along its line of sight things are sharp, in world units [default: the scene file's, else the focal
+    /// point]
+    #[arg(long, value_name = "DISTANCE", value_parser = values::positive)]
+    pub(crate) focus_distance: Option<f64>,
 }
 
 #[derive(Args, Debug)]

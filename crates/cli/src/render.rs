@@ -22,7 +22,9 @@ use crate::hdri;
 use crate::interrupt::Interrupt;
 use crate::merge;
 use crate::progress::{Keep, Progress, Style, duration};
-use crate::report::{Ablation, Counts, RenderReport, Seconds, effects, explain_effects, rays_in_words, warnings};
+use crate::report::{
+    Ablation, Counts, Paths, RenderReport, Seconds, effects, explain_effects, rays_in_words, warnings,
+};
 use crate::simd;
 use crate::target::{Target, writable};
 use crate::values::{Explain, Hdri, Resolution, Switch};
@@ -144,6 +146,7 @@ impl Job<'_> {
             let processor = rendered.stats.seconds * rayon::current_num_threads() as f64;
             explain_effects(&rendered.effects, stage.kernel().name(), processor).iter().for_each(message);
             ablation.iter().flat_map(Ablation::lines).for_each(message);
+            Paths::new(&rendered.stats.light).iter().map(Paths::in_words).for_each(|words| message(&words));
         }
         self.console.say(self.summary(&rendered, counts, seconds));
         if args.run.json {
@@ -165,6 +168,7 @@ impl Job<'_> {
                 seconds,
                 rays: rendered.stats.rays.by_name().into_iter().collect(),
                 samples: rendered.stats.samples,
+                light_paths: Paths::new(&rendered.stats.light),
                 noise: rendered.stats.noise,
                 out_of_time: rendered.out_of_time,
                 bad_samples: rendered.stats.bad_samples,
@@ -288,8 +292,10 @@ impl Job<'_> {
             (false, false) => "done",
         };
         let noise = rendered.stats.noise.map_or(String::new(), |n| format!(", noise at most {n:.3}"));
+        let share = rendered.stats.light.share();
+        let seen = share.map_or(String::new(), |s| format!(", {:.1} % of the points that light met seen", 100.0 * s));
         format!(
-            "{done}: {counts}, {:.0} samples per pixel{noise}, {}; load {:.2} s, build {:.2} s, render {:.2} s; wrote {}",
+            "{done}: {counts}, {:.0} samples per pixel{noise}, {}{seen}; load {:.2} s, build {:.2} s, render {:.2} s; wrote {}",
             rendered.film.samples_per_pixel(),
             rays_in_words(&rendered.stats.rays),
             seconds.load,
@@ -336,7 +342,8 @@ struct Effort {
 impl Effort {
     fn new(args: &QualityArgs) -> Self {
         let asked = args.noise_threshold.map(|e| e as f32);
-        let adaptive = matches!(args.integrator, IntegratorChoice::Auto | IntegratorChoice::Path);
+        let adaptive =
+            matches!(args.integrator, IntegratorChoice::Auto | IntegratorChoice::Path | IntegratorChoice::Light);
         if let Some((_, end)) = args.samples_range {
             return Self { spp: end, noise_threshold: None, time_limit: args.time_limit, announce: false };
         }
@@ -409,6 +416,7 @@ fn stage_options(args: &RenderArgs, render: &RenderOptions, target: &Target) -> 
         energy_compensation: args.quality.energy_compensation == Switch::On,
         shadow_terminator: args.quality.shadow_terminator == Switch::On,
         texture_filter: args.quality.texture_filter,
+        motion_steps: args.camera.motion_steps,
     })
 }
 
@@ -422,6 +430,8 @@ fn camera_changes(args: &CameraArgs) -> CameraChanges {
         elevation: args.camera_elevation_angle.to_radians(),
         zoom: args.camera_zoom_factor,
         orthographic: args.camera_orthographic,
+        aperture: args.aperture,
+        focus_distance: args.focus_distance,
     }
 }
 

@@ -5,7 +5,7 @@ use std::fmt;
 
 use firsthit_import::scene::SurfaceDesc;
 use firsthit_import::{Report, SceneDesc};
-use firsthit_render::{Ablations, EffectEntry, EffectPlan, RayCounts};
+use firsthit_render::{Ablations, EffectEntry, EffectPlan, LightPaths, RayCounts};
 use serde::Serialize;
 
 use crate::console::{count, short};
@@ -34,6 +34,9 @@ pub(crate) struct RenderReport<'a> {
     /// Rays cast, by kind.
     pub(crate) rays: BTreeMap<&'static str, u64>,
     pub(crate) samples: u64,
+    /// Paths from the lights; absent where none were followed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) light_paths: Option<Paths>,
     /// Estimated noise of the noisiest tile; `null` below 32 samples.
     pub(crate) noise: Option<f32>,
     /// Whether the time limit ended it.
@@ -52,6 +55,37 @@ pub(crate) struct RenderReport<'a> {
     pub(crate) warnings: Vec<String>,
     /// Warnings beyond those listed.
     pub(crate) more_warnings: u64,
+}
+
+/// Paths from the lights.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct Paths {
+    pub(crate) paths: u64,
+    /// Points where light met a surface that spreads it.
+    pub(crate) vertices: u64,
+    /// Those of them that the camera saw.
+    pub(crate) seen: u64,
+    /// Their share.
+    pub(crate) share_seen: Option<f64>,
+}
+
+impl Paths {
+    /// `None` where there were none.
+    pub(crate) fn new(light: &LightPaths) -> Option<Self> {
+        let LightPaths { paths, vertices, seen } = *light;
+        (paths > 0).then(|| Self { paths, vertices, seen, share_seen: light.share() })
+    }
+
+    /// In words, for people.
+    pub(crate) fn in_words(&self) -> String {
+        let share = self.share_seen.unwrap_or(0.0);
+        format!(
+            "{} light paths met surfaces {} times; {:.1} % of these points are seen by the camera",
+            short(self.paths as f64),
+            short(self.vertices as f64),
+            100.0 * share
+        )
+    }
 }
 
 /// What a scene shows.

@@ -219,13 +219,15 @@ pub(crate) fn integrator(s: &str) -> Result<IntegratorChoice, String> {
     Ok(match s {
         "auto" => IntegratorChoice::Auto,
         "path" => IntegratorChoice::Path,
+        "light" => IntegratorChoice::Light,
         "whitted" => IntegratorChoice::Whitted,
         "direct" => IntegratorChoice::Direct,
         "ao" | "ambient-occlusion" => IntegratorChoice::AmbientOcclusion,
         other => {
             let aov = Aov::from_str(other).ok().filter(|a| a.is_sampled());
-            let aov =
-                aov.ok_or_else(|| format!("expected auto, path, whitted, direct, ao, or one of: {}", aov_names()))?;
+            let aov = aov.ok_or_else(|| {
+                format!("expected auto, path, light, whitted, direct, ao, or one of: {}", aov_names())
+            })?;
             IntegratorChoice::Aov(aov)
         }
     })

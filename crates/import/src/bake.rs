@@ -21,7 +21,9 @@ impl SceneDesc {
         let mut drawn = vec![true; self.instances.len()];
         for (i, instance) in self.instances.iter_mut().enumerate() {
             let Err(fault) = Transform::new(instance.transform) else { continue };
-            let InstanceDesc { name, mesh, transform } = instance;
+            let InstanceDesc { name, mesh, transform, moves_to } = instance;
+            // Its vertices are where they were when the shutter opened.
+            *moves_to = None;
             let shared = users[*mesh] > 1;
             users[*mesh] -= 1;
             let whole = &mut self.meshes[*mesh];
@@ -176,7 +178,7 @@ mod tests {
 
     fn scene(transforms: &[DAffine3]) -> SceneDesc {
         let geometry = |surface| GeometryDesc { name: String::new(), surface, material: None };
-        let instance = |&transform| InstanceDesc { name: String::new(), mesh: 0, transform };
+        let instance = |&transform| InstanceDesc { name: String::new(), mesh: 0, transform, moves_to: None };
         SceneDesc {
             meshes: vec![MeshDesc {
                 geometries: vec![geometry(SurfaceDesc::Triangles(triangle()))],

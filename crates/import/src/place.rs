@@ -3,7 +3,9 @@
 use glam::{DAffine3, DMat3, DVec3};
 
 use crate::SceneDesc;
-use crate::scene::{CameraDesc, EnvironmentDesc, InstanceDesc, LightDesc, LightKind, MaterialModel, Projection};
+use crate::scene::{
+    CameraDesc, EnvironmentDesc, InstanceDesc, LensDesc, LightDesc, LightKind, MaterialModel, Projection,
+};
 
 /// What of a scene has a place in the world. Indices are those of the scene it was adopted by.
 #[derive(Clone, Debug, Default)]
@@ -16,7 +18,7 @@ pub(crate) struct Placeable {
 impl SceneDesc {
     /// Adds another scene's content, moved by `transform`. The indices of what is already here stay as they are.
     ///
-    /// The name and the settings of `self` stay; the environment of `other` is taken over, unmoved, where `self` has
+    /// The name and the settings of `self` stay; environment and fog of `other` are taken over, unmoved, where `self` has
     /// none. Spheres of light and orthographic cameras grow by the cube root of the transform's determinant.
     ///
     /// ```
@@ -25,7 +27,7 @@ impl SceneDesc {
     ///
     /// let part = SceneDesc {
     ///     meshes: vec![MeshDesc::default()],
-    ///     instances: vec![InstanceDesc { name: "part".into(), mesh: 0, transform: DAffine3::IDENTITY }],
+    ///     instances: vec![InstanceDesc { name: "part".into(), mesh: 0, transform: DAffine3::IDENTITY, moves_to: None }],
     ///     ..SceneDesc::default()
     /// };
     /// let mut scene = part.clone();
@@ -57,6 +59,7 @@ impl SceneDesc {
             }
             self.environment = other.environment;
         }
+        self.fog = self.fog.or(other.fog);
         other.instances.iter_mut().for_each(|i| i.mesh += mesh);
         self.meshes.append(&mut other.meshes);
         self.materials.append(&mut other.materials);
@@ -136,7 +139,7 @@ impl Placeable {
 
 impl InstanceDesc {
     fn moved(self, by: DAffine3) -> Self {
-        Self { transform: by * self.transform, ..self }
+        Self { transform: by * self.transform, moves_to: self.moves_to.map(|m| by * m), ..self }
     }
 }
 
@@ -188,7 +191,11 @@ impl CameraDesc {
             }
             perspective @ Projection::Perspective { .. } => perspective,
         };
-        Self { name: self.name, transform: DAffine3 { matrix3, translation: moved.translation }, projection }
+        let lens = self.lens.map(|lens| LensDesc {
+            aperture: lens.aperture * mean_scale(by),
+            focus_distance: lens.focus_distance.map(|d| d * mean_scale(by)),
+        });
+        Self { name: self.name, transform: DAffine3 { matrix3, translation: moved.translation }, projection, lens }
     }
 }
 

@@ -34,6 +34,8 @@ pub struct SceneDesc {
     pub cameras: Vec<CameraDesc>,
     /// What surrounds the scene; `None`: the file does not say.
     pub environment: Option<EnvironmentDesc>,
+    /// What fills the space between things; `None`: nothing.
+    pub fog: Option<FogDesc>,
     /// What the file says about how to render it.
     pub settings: Settings,
 }
@@ -110,6 +112,8 @@ pub struct InstanceDesc {
     pub mesh: usize,
     /// From the mesh's space to the world. May mirror; must be invertible (readers bake or skip what is not).
     pub transform: DAffine3,
+    /// Where it is when the camera's shutter closes, if it moves: `transform` is where it is when the shutter opens.
+    pub moves_to: Option<DAffine3>,
 }
 
 /// How an image is put on a surface.
@@ -340,8 +344,32 @@ pub struct CameraDesc {
     pub name: String,
     /// From camera to world: it looks along its -Z, +Y is up.
     pub transform: DAffine3,
-    /// Its lens.
+    /// How it maps the scene to the picture.
     pub projection: Projection,
+    /// Its lens; `None`: a pinhole, before which everything is sharp.
+    pub lens: Option<LensDesc>,
+}
+
+/// A thin lens.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LensDesc {
+    /// The diameter of its opening, world units.
+    pub aperture: f64,
+    /// How far away, along the line of sight, things are sharp, world units; `None`: where the camera looks at.
+    pub focus_distance: Option<f64>,
+}
+
+/// Fog that is the same everywhere outside of solids.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FogDesc {
+    /// Light that is scattered on each unit of its way, 1/world unit.
+    pub scattering: Vec3,
+    /// Light that is taken away on each unit of its way, 1/world unit.
+    pub absorption: Vec3,
+    /// The mean cosine of the angle of scattering, in (-1, 1): 0 evenly, near 1 mostly onwards (Henyey and Greenstein).
+    pub g: f32,
+    /// Two corners of the box that it fills; `None`: all of space, so that no light comes from infinitely far away.
+    pub bounds: Option<(DVec3, DVec3)>,
 }
 
 /// How a camera maps the scene to the picture.

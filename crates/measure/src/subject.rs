@@ -154,7 +154,7 @@ pub fn desc_of(mesh: &Mesh) -> SceneDesc {
     let geometry = GeometryDesc { name: String::new(), surface, material: None };
     SceneDesc {
         meshes: vec![MeshDesc { name: String::new(), geometries: vec![geometry] }],
-        instances: vec![InstanceDesc { name: String::new(), mesh: 0, transform: DAffine3::IDENTITY }],
+        instances: vec![InstanceDesc { name: String::new(), mesh: 0, transform: DAffine3::IDENTITY, moves_to: None }],
         ..SceneDesc::default()
     }
 }
@@ -195,6 +195,7 @@ mod tests {
             name: String::new(),
             mesh: 0,
             transform: DAffine3::from_translation(DVec3::X),
+            moves_to: None,
         });
         let subject = Subject::new("two", desc);
         assert_eq!(subject.triangles(), 40);
@@ -234,7 +235,12 @@ mod tests {
         let mut desc = desc_of(&half(0..40));
         assert!(!Subject::new("half", desc.clone()).closed);
         desc.meshes.extend(desc_of(&half(40..80)).meshes);
-        desc.instances.push(InstanceDesc { name: String::new(), mesh: 1, transform: DAffine3::IDENTITY });
+        desc.instances.push(InstanceDesc {
+            name: String::new(),
+            mesh: 1,
+            transform: DAffine3::IDENTITY,
+            moves_to: None,
+        });
         assert!(Subject::new("whole", desc).closed);
     }
 }

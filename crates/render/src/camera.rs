@@ -25,6 +25,10 @@ pub struct Camera {
     up: DVec3,
     projection: Projection,
     focal_distance: f64,
+    /// Radius of its lens, world units; 0: a pinhole.
+    lens_radius: f64,
+    /// How far away things are sharp, if that is not at the focal point.
+    focus_distance: Option<f64>,
 }
 
 /// A camera that cannot be.
@@ -43,6 +47,9 @@ pub enum CameraError {
     /// A size of view or zoom factor out of range.
     #[error("the camera's {0} must be more than 0")]
     NotPositive(&'static str),
+    /// The opening of its lens is out of range.
+    #[error("the camera's aperture must be 0 or more")]
+    Aperture,
     /// Its transform has no inverse.
     #[error("the camera's transform is degenerate")]
     Degenerate,
@@ -68,6 +75,8 @@ impl Camera {
             up: DVec3::Y,
             projection: checked(projection)?,
             focal_distance: 1.0,
+            lens_radius: 0.0,
+            focus_distance: None,
         };
         camera.aim(position, focal_point, view_up)?;
         Ok(camera)
@@ -86,14 +95,47 @@ impl Camera {
         let forward = (-m.matrix3.z_axis).try_normalize().ok_or(CameraError::Degenerate)?;
         let right = forward.cross(m.matrix3.y_axis).try_normalize().ok_or(CameraError::Degenerate)?;
         let depth = (bounds.center() - m.translation).dot(forward);
-        Ok(Self {
+        let camera = Self {
             position: m.translation,
             forward,
             right,
             up: right.cross(forward),
             projection: checked(desc.projection)?,
             focal_distance: if depth > 0.0 && depth.is_finite() { depth } else { 1.0 },
-        })
+            lens_radius: 0.0,
+            focus_distance: None,
+        };
+        match desc.lens {
+            Some(lens) => camera.with_lens(lens.aperture, lens.focus_distance),
+            None => Ok(camera),
+        }
+    }
+
+    /// The same with a thin lens whose opening is `aperture` wide (diameter, world units; 0: a pinhole) and before which
+    /// things are sharp at this distance along the line of sight; `None`: at the focal point. Parallel projections blur
+    /// as well: each of their rays has a lens of its own.
+    ///
+    /// # Errors
+    /// When the aperture is negative, the distance is not positive, or one of them is not finite.
+    pub fn with_lens(self, aperture: f64, focus_distance: Option<f64>) -> Result<Self, CameraError> {
+        if !(aperture >= 0.0 && aperture.is_finite()) {
+            return Err(CameraError::Aperture);
+        }
+        if !focus_distance.is_none_or(|d| d > 0.0 && d.is_finite()) {
+            return Err(CameraError::NotPositive("focus distance"));
+        }
+        Ok(Self { lens_radius: 0.5 * aperture, focus_distance, ..self })
+    }
+
+    /// Whether it has more than a pinhole.
+    #[must_use]
+    pub fn has_lens(&self) -> bool {
+        self.lens_radius > 0.0
+    }
+
+    /// The same as a pinhole.
+    pub(crate) fn without_lens(self) -> Self {
+        Self { lens_radius: 0.0, ..self }
     }
 
     /// This camera with the user's changes: first where it is and looks, then the turns about the focal point
@@ -138,7 +180,8 @@ impl Camera {
             let half_height = camera.focal_distance * (0.5 * vertical_fov).tan();
             camera.projection = checked(Projection::Orthographic { half_height, aspect })?;
         }
-        Ok(camera)
+        let focus = changes.focus_distance.or(camera.focus_distance);
+        camera.with_lens(changes.aperture.unwrap_or(2.0 * self.lens_radius), focus)
     }
 
     /// Where it stands.
@@ -190,8 +233,14 @@ impl Camera {
             Projection::Orthographic { half_height, aspect } => (half_height, aspect, false),
         };
         let half_height = half_height * made_for.map_or(1.0, |a| (a / shape).max(1.0));
+        let lens = self.has_lens().then(|| Lens {
+            right: self.right * self.lens_radius,
+            up: self.up * self.lens_radius,
+            focus: self.focus_distance.unwrap_or(self.focal_distance),
+        });
         FilmCamera {
             position: self.position,
+            lens,
             forward: self.forward,
             right: self.right * (half_height * shape),
             up: self.up * half_height,
@@ -271,6 +320,7 @@ fn checked(projection: Projection) -> Result<Projection, CameraError> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FilmCamera {
     position: DVec3,
+    lens: Option<Lens>,
     forward: DVec3,
     /// From the middle of the picture to its right edge, at distance 1 (parallel projection: at any).
     right: DVec3,
@@ -281,6 +331,16 @@ pub struct FilmCamera {
     perspective: bool,
 }
 
+/// A thin lens.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Lens {
+    /// From its middle to its rim.
+    right: DVec3,
+    up: DVec3,
+    /// Where things are sharp.
+    focus: f64,
+}
+
 /// How wide a pixel's view is: a cone along the ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cone {
@@ -288,6 +348,17 @@ pub struct Cone {
     pub width: f64,
     /// How much it grows for each unit of distance.
     pub spread: f64,
+}
+
+/// A point of the world as a camera sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Projected {
+    /// Where in the picture, in pixels, as [`FilmCamera::ray`] counts them.
+    pub at: [f64; 2],
+    /// Where the ray that sees it starts.
+    pub eye: DVec3,
+    /// How many pixels one unit of area covers there that faces the camera.
+    pub pixels_per_area: f64,
 }
 
 impl FilmCamera {
@@ -302,6 +373,60 @@ impl FilmCamera {
         } else {
             Ray::new(self.position + across, self.forward)
         }
+    }
+
+    /// Whether it has more than a pinhole.
+    #[inline]
+    #[must_use]
+    pub fn has_lens(&self) -> bool {
+        self.lens.is_some()
+    }
+
+    /// The ray through a point of the picture, as [`FilmCamera::ray`], and through this point of the lens, in radii from
+    /// its middle: to the right, upwards.
+    #[inline]
+    #[must_use]
+    pub fn ray_through_lens(&self, at: [f64; 2], on_lens: [f64; 2]) -> Ray<f64> {
+        let middle = self.ray(at);
+        let Some(lens) = &self.lens else { return middle };
+        let offset = lens.right * on_lens[0] + lens.up * on_lens[1];
+        // Where all rays through this point of the picture meet.
+        let sharp = middle.direction * (lens.focus / middle.direction.dot(self.forward));
+        Ray::new(middle.origin + offset, (sharp - offset).normalize())
+    }
+
+    /// Where in the picture a point of the world is seen through a point of the lens, as of
+    /// [`FilmCamera::ray_through_lens`]; `None` of what is not in front of the camera.
+    #[inline]
+    #[must_use]
+    pub fn project(&self, point: DVec3, on_lens: [f64; 2]) -> Option<Projected> {
+        let depth = (point - self.position).dot(self.forward);
+        if !(depth > 0.0) {
+            return None;
+        }
+        let (offset, focus) = match &self.lens {
+            Some(lens) => (lens.right * on_lens[0] + lens.up * on_lens[1], lens.focus),
+            None => (DVec3::ZERO, depth),
+        };
+        let (across, eye) = if self.perspective {
+            // Where the way from the lens to the point meets the plane of what is sharp.
+            let sharp = offset + (point - self.position - offset) * (focus / depth);
+            (sharp / focus, self.position + offset)
+        } else {
+            let middle = point - offset - (self.forward * focus - offset) * (depth / focus) - self.position;
+            (middle, self.position + middle + offset)
+        };
+        let to = point - eye;
+        let cos = depth / to.length();
+        let pixels_per_area = if self.perspective {
+            // A pixel at distance 1 / cos is seen under this share of its area.
+            1.0 / (self.pixel * self.pixel * cos.powi(3) * to.length_squared())
+        } else {
+            1.0 / (self.pixel * self.pixel * cos)
+        };
+        let (x, y) =
+            (across.dot(self.right) / self.right.length_squared(), across.dot(self.up) / self.up.length_squared());
+        Some(Projected { at: [0.5 * (x + 1.0) * self.size[0], 0.5 * (1.0 - y) * self.size[1]], eye, pixels_per_area })
     }
 
     /// How wide a pixel's view is (in the middle of the picture).
@@ -324,6 +449,38 @@ mod tests {
 
     fn standard() -> Camera {
         Camera::look_at(DVec3::new(0.0, 1.8, 5.5), DVec3::new(0.0, 0.6, 0.0), DVec3::Y, 40_f64.to_radians()).unwrap()
+    }
+
+    /// What is projected is on the ray of that place; and a little disk of area is as many pixels as is said.
+    #[test]
+    fn projecting_undoes_rays() {
+        let orthographic = CameraChanges { orthographic: true, ..Default::default() };
+        for (camera, on_lens) in [
+            (standard(), [0.0, 0.0]),
+            (standard().with_lens(0.4, Some(3.0)).unwrap(), [0.3, -0.8]),
+            (standard().changed(&orthographic).unwrap(), [0.0, 0.0]),
+            (standard().changed(&orthographic).unwrap().with_lens(0.4, None).unwrap(), [-0.5, 0.6]),
+        ] {
+            let film = camera.on_film(120, 80);
+            for (at, t) in [([10.0, 20.0], 2.0), ([61.0, 39.5], 7.0), ([110.0, 75.0], 4.0)] {
+                let ray = film.ray_through_lens(at, on_lens);
+                let point = ray.at(t);
+                let seen = film.project(point, on_lens).unwrap();
+                close(seen.eye, ray.origin);
+                assert!((seen.at[0] - at[0]).abs() < 1e-9 && (seen.at[1] - at[1]).abs() < 1e-9, "{seen:?}");
+                let (u, v) = (ray.direction.any_orthonormal_vector(), 1e-5);
+                let w = ray.direction.cross(u);
+                let place = |p: DVec3| glam::DVec2::from(film.project(p, on_lens).unwrap().at);
+                let (du, dv) =
+                    (place(point + u * v) - place(point - u * v), place(point + w * v) - place(point - w * v));
+                let pixels = du.perp_dot(dv).abs() / (4.0 * v * v);
+                assert!((pixels / seen.pixels_per_area - 1.0).abs() < 1e-5, "{pixels} {seen:?}");
+            }
+            assert_eq!(film.project(camera.position() - camera.forward(), on_lens), None);
+        }
+        assert_eq!(standard().with_lens(-0.1, None), Err(CameraError::Aperture));
+        assert_eq!(standard().with_lens(f64::NAN, None), Err(CameraError::Aperture));
+        assert_eq!(standard().with_lens(0.1, Some(0.0)), Err(CameraError::NotPositive("focus distance")));
     }
 
     /// The formula of the reference scenes, written out: d = f + (2 px/W - 1) tan(fov/2) r + (1 - 2 py/H) tan(fov/2) u.
@@ -363,6 +520,7 @@ mod tests {
             // Scale does not matter.
             transform: DAffine3::from_mat3_translation(turn * 3.0, DVec3::new(1.0, 2.0, 3.0)),
             projection: Projection::Perspective { vertical_fov: 0.7, aspect: None },
+            lens: None,
         };
         let camera = Camera::from_desc(&desc, &Aabb::empty()).unwrap();
         close(camera.forward(), turn * DVec3::NEG_Z);
@@ -378,7 +536,7 @@ mod tests {
     #[test]
     fn a_narrow_picture_shows_all_that_a_files_camera_shows() {
         let projection = Projection::Perspective { vertical_fov: 0.8, aspect: Some(2.0) };
-        let desc = CameraDesc { name: String::new(), transform: DAffine3::IDENTITY, projection };
+        let desc = CameraDesc { name: String::new(), transform: DAffine3::IDENTITY, projection, lens: None };
         let camera = Camera::from_desc(&desc, &Aabb::empty()).unwrap();
         let half_width = |w, h| {
             let d = camera.on_film(w, h).ray([f64::from(w), 0.5 * f64::from(h)]).direction;
@@ -467,6 +625,7 @@ mod tests {
             name: String::new(),
             transform: DAffine3::ZERO,
             projection: Projection::Orthographic { half_height: 1.0, aspect: None },
+            lens: None,
         };
         assert_eq!(Camera::from_desc(&desc, &Aabb::empty()), Err(CameraError::Degenerate));
     }

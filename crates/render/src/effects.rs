@@ -55,6 +55,12 @@ bitflags! {
         const DIFFUSE_TRANSMISSION = 1 << 24;
         /// Indices of refraction that differ between colours.
         const DISPERSION = 1 << 25;
+        /// Blur before and behind where the camera's lens is sharp.
+        const DEPTH_OF_FIELD = 1 << 18;
+        /// Blur of what moves while the shutter is open.
+        const MOTION = 1 << 19;
+        /// Fog. Only path tracing simulates it.
+        const FOG = 1 << 26;
         /// Light that surfaces send to each other. Only path tracing simulates it.
         const INDIRECT_LIGHT = 1 << 17;
     }
@@ -72,7 +78,7 @@ impl EffectSet {
         .union(Self::DIFFUSE_TRANSMISSION);
 
     /// Every single effect with the name that command lines and reports use, in the order of reports.
-    pub const NAMES: [(Self, &'static str); 24] = [
+    pub const NAMES: [(Self, &'static str); 27] = [
         (Self::SHADOWS, "shadows"),
         (Self::PUNCTUAL_LIGHTS, "punctual-lights"),
         (Self::AREA_LIGHTS, "area-lights"),
@@ -96,6 +102,9 @@ impl EffectSet {
         (Self::ANISOTROPY, "anisotropy"),
         (Self::DIFFUSE_TRANSMISSION, "diffuse-transmission"),
         (Self::DISPERSION, "dispersion"),
+        (Self::DEPTH_OF_FIELD, "depth-of-field"),
+        (Self::MOTION, "motion"),
+        (Self::FOG, "fog"),
         (Self::INDIRECT_LIGHT, "indirect-light"),
     ];
 
@@ -248,6 +257,7 @@ fn kinds_of(effect: EffectSet) -> &'static [RayKind] {
         EffectSet::TRANSMISSION => &[Transmission],
         EffectSet::ALPHA_BLEND => &[Transparency],
         EffectSet::AMBIENT_OCCLUSION => &[AmbientOcclusion],
+        EffectSet::FOG => &[RayKind::Fog],
         _ => &[],
     }
 }

@@ -19,6 +19,33 @@ pub enum Filter {
 }
 
 impl Filter {
+    /// How far from a pixel's middle light still counts, in pixels along each axis.
+    #[must_use]
+    pub fn radius(&self) -> f64 {
+        match self {
+            Self::Box => 0.5,
+            Self::Window { radius, .. } => *radius,
+        }
+    }
+
+    /// The weight along one axis at this distance from the pixel's middle, in pixels: the density of
+    /// [`Filter::offset`].
+    #[inline]
+    #[must_use]
+    pub fn density(&self, x: f64) -> f64 {
+        match self {
+            Self::Box => f64::from(u8::from((-0.5..0.5).contains(&x))),
+            Self::Window { radius, weights } => {
+                let steps = weights.cells() as f64;
+                let step = (0.5 * (x / radius + 1.0) * steps).floor();
+                if !(0.0..steps).contains(&step) {
+                    return 0.0;
+                }
+                f64::from(weights.probability(step as usize)) * steps / (2.0 * radius)
+            }
+        }
+    }
+
     /// The four-term Blackman-Harris window of radius 1.5 pixels: smooth, nearly free of ringing and aliasing.
     ///
     /// Harris, *On the Use of Windows for Harmonic Analysis with the Discrete Fourier Transform*, 1978.
@@ -59,6 +86,24 @@ mod tests {
     #[test]
     fn the_box_covers_its_pixel_evenly() {
         assert_eq!(Filter::Box.offset([0.0, 0.75]), [-0.5, 0.25]);
+    }
+
+    /// What falls on a point counts once in all pixels together.
+    #[test]
+    fn weights_of_all_pixels_add_up_to_one() {
+        for filter in [Filter::Box, Filter::blackman_harris()] {
+            for i in 0..100 {
+                let x = f64::from(i) / 100.0 - 0.5;
+                let sum: f64 = (-3..=3).map(|k| filter.density(x - f64::from(k))).sum();
+                // A window is not made to; averaged over the pixel it does.
+                let tolerance = if matches!(filter, Filter::Box) { 0.0 } else { 0.02 };
+                assert!((sum - 1.0).abs() <= tolerance, "{sum} at {x}");
+            }
+            let n = 3000;
+            let integral: f64 =
+                (0..n).map(|i| filter.density((f64::from(i) + 0.5) / 1000.0 - 1.5)).sum::<f64>() / 1000.0;
+            assert!((integral - 1.0).abs() < 1e-3, "{integral}");
+        }
     }
 
     /// Moments of the sampled offsets against those of the window, by the midpoint rule.

@@ -76,6 +76,8 @@ pub enum IntegratorChoice {
     Auto,
     /// All ways that light takes, by path tracing.
     Path,
+    /// The same light by paths that start at the lights: good at caustics.
+    Light,
     /// Direct light, mirror reflection, refraction, transparency.
     Whitted,
     /// Direct light alone.
@@ -145,6 +147,8 @@ pub struct StageOptions {
     pub shadow_terminator: bool,
     /// How textures are anti-aliased.
     pub texture_filter: TextureFilter,
+    /// Into how many steps the time is cut while the shutter is open, where something moves; at least 1.
+    pub motion_steps: u32,
 }
 
 /// How textures are anti-aliased where the file asks for smooth ones.
@@ -170,6 +174,7 @@ impl Default for StageOptions {
             energy_compensation: true,
             shadow_terminator: true,
             texture_filter: TextureFilter::default(),
+            motion_steps: 16,
         }
     }
 }
@@ -243,4 +248,8 @@ pub struct CameraChanges {
     pub zoom: Option<f64>,
     /// Parallel projection.
     pub orthographic: bool,
+    /// Diameter of its lens, world units; 0: a pinhole, before which everything is sharp.
+    pub aperture: Option<f64>,
+    /// How far away along its line of sight things are sharp, world units.
+    pub focus_distance: Option<f64>,
 }

@@ -13,6 +13,7 @@ use crate::camera::{Cone, FilmCamera};
 use crate::checkpoint::Rest;
 use crate::film::{Accumulator, Band};
 use crate::filter::Filter;
+use crate::forward::{Forward, Refusal};
 use crate::integrator::clock::{self, Clock};
 use crate::integrator::whitted::{Limits, Seen};
 use crate::integrator::{Timing, Tracer};
@@ -20,10 +21,11 @@ use crate::kernel::{Clear, Filtered, Full, Kernel, Plain, Textured, TexturedFilt
 use crate::material::lobes::LobeKind;
 use crate::noise::Tiles;
 use crate::sampler::{Dimension, PixelSampler};
+use crate::splat::Splats;
 use crate::tally::Tally;
 use crate::{
-    Aov, Checkpoint, Clip, EffectPlan, EffectSet, Film, FilterChoice, IntegratorChoice, KernelChoice, Monitor,
-    RayCounts, RenderOptions, RenderStats, Stage, Sums,
+    Aov, Checkpoint, Clip, EffectPlan, EffectSet, Film, FilterChoice, IntegratorChoice, KernelChoice, LightPaths,
+    Monitor, RayCounts, RenderOptions, RenderStats, Stage, Sums, tally, warp,
 };
 
 /// Options that no picture can be made with.
@@ -58,6 +60,9 @@ pub enum RenderError {
     /// What is to be gone on with is of another picture.
     #[error("the checkpoint is of a picture of another size, window or first sample, or with other pictures beside it")]
     OtherPicture,
+    /// Light from infinitely far away is to be followed into a scene that has no end.
+    #[error("paths cannot start at a sky or sun where the scene has no end: the integrator 'path' can do it")]
+    Endless,
     /// The crop window has no pixel in the picture.
     #[error("the crop window lies outside the picture")]
     EmptyCrop,
@@ -201,6 +206,13 @@ fn render_watched(
     let start = Instant::now();
     // Chosen once: the rest is compiled for what the scene calls for.
     let job = Job::new(stage, options, &film);
+    let mut forward = match job.method {
+        Method::Forward(_) => Some(Forward::new(stage, options, film.window(), &job.filter).map_err(|e| match e {
+            Refusal::Endless => RenderError::Endless,
+            Refusal::Memory => RenderError::Memory { bytes: Film::bytes(width, height, crop, aovs) },
+        })?),
+        _ => None,
+    };
     let run = match stage.kernel() {
         KernelChoice::Plain => Job::run::<Plain>,
         KernelChoice::Textured => Job::run::<Textured>,
@@ -209,10 +221,13 @@ fn render_watched(
         KernelChoice::Clear => Job::run::<Clear>,
         KernelChoice::Full => Job::run::<Full>,
     };
-    let (done, end) = run(&job, &mut film, &mut tiles, &mut rest, monitor);
+    let (done, end) = run(&job, &mut film, &mut tiles, &mut rest, forward.as_mut(), monitor);
     let mut plan = stage.plan().clone();
-    if !matches!(job.method, Method::Path(_)) {
+    if !matches!(job.method, Method::Path(_) | Method::Forward(_)) {
         plan.leave(EffectSet::INDIRECT_LIGHT);
+    }
+    if !matches!(job.method, Method::Path(_)) {
+        plan.leave(EffectSet::FOG);
     }
     if !job.clip.is_all() {
         plan.ask(EffectSet::CLIPPING, "the section asked for");
@@ -225,6 +240,7 @@ fn render_watched(
         rays: done.rays,
         samples: done.samples,
         bad_samples: done.bad,
+        light: done.light,
         noise: tiles.most(&film),
         seconds: start.elapsed().as_secs_f64(),
         breakdown: done.timing.parts.breakdown(done.timing.traversal(), clock::look()),
@@ -270,6 +286,7 @@ struct Done {
     timing: Timing,
     samples: u64,
     bad: u64,
+    light: LightPaths,
     /// Whether something was left out because time was up.
     late: bool,
     /// Whether something was left for later, so that a checkpoint can be made.
@@ -283,6 +300,7 @@ impl Done {
         self.timing.add(&other.timing);
         self.samples += other.samples;
         self.bad += other.bad;
+        self.light += other.light;
         self.late |= other.late;
         self.paused |= other.paused;
         self
@@ -294,6 +312,8 @@ impl Done {
 enum Method {
     /// All light by paths that follow these lobes.
     Path(LobeKind),
+    /// All light by paths from the lights; the camera's follow these lobes where it sees mirrors.
+    Forward(LobeKind),
     /// Light by Whitted's method, following these lobes.
     Light(LobeKind),
     /// Ambient occlusion within a distance.
@@ -365,6 +385,10 @@ impl<'a> Job<'a> {
                 follow.set(LobeKind::DIFFUSE, simulated.contains(EffectSet::INDIRECT_LIGHT));
                 Method::Path(follow)
             }
+            IntegratorChoice::Light => {
+                follow.set(LobeKind::DIFFUSE, simulated.contains(EffectSet::INDIRECT_LIGHT));
+                Method::Forward(follow)
+            }
             IntegratorChoice::Whitted => Method::Light(follow),
             IntegratorChoice::Direct => Method::Light(LobeKind::empty()),
             IntegratorChoice::AmbientOcclusion => Method::Occlusion(0.25 * size),
@@ -397,6 +421,7 @@ impl<'a> Job<'a> {
         film: &mut Film,
         tiles: &mut Tiles,
         rest: &mut Rest,
+        mut forward: Option<&mut Forward>,
         monitor: &dyn Monitor,
     ) -> (Done, End) {
         let window = film.window();
@@ -407,7 +432,37 @@ impl<'a> Job<'a> {
         rest.active = tiles.active().to_vec();
         while rest.pass < self.options.spp && tiles.any() {
             let first = rest.pass;
-            let last = next_pass(first).min(self.options.spp);
+            let mut last = next_pass(first).min(self.options.spp);
+            if let Some(forward) = &mut forward {
+                if self.is_late(first) {
+                    return (done, End::OutOfTime);
+                }
+                // Light paths are followed for one sample of all pixels at a time.
+                last = first + 1;
+                let of_camera = (&self.camera, self.cone);
+                let limits = self.limits();
+                let paths = forward.sample::<K>(
+                    self.stage,
+                    self.options,
+                    first,
+                    limits,
+                    of_camera,
+                    &self.filter,
+                    &self.clip,
+                    monitor,
+                );
+                done = done.and(Done {
+                    rays: paths.rays,
+                    timing: paths.timing,
+                    light: paths.light,
+                    tally: paths.tally,
+                    ..Done::default()
+                });
+                if monitor.cancelled() {
+                    return (done, End::Cancelled);
+                }
+            }
+            let splats = forward.as_deref().map(Forward::splats);
             let mut whole = true;
             let complete: Vec<AtomicBool> = (0..bands).map(|_| AtomicBool::new(false)).collect();
             // Once, or with pauses for checkpoints.
@@ -419,7 +474,10 @@ impl<'a> Job<'a> {
                     .map(|(mut band, complete)| {
                         let clock = Clock::default();
                         let mut tracer = Tracer::<K>::new(self.stage, &self.clip);
-                        let band_done = self.band(&mut tracer, &clock, &mut band, first..last, tiles, monitor);
+                        if matches!(self.method, Method::Path(_)) {
+                            tracer.fog = self.stage.fog.as_ref();
+                        }
+                        let band_done = self.band(&mut tracer, &clock, &mut band, first..last, tiles, splats, monitor);
                         complete.store(!band_done.paused, Ordering::Relaxed);
                         let new = if band_done.paused { 0 } else { u64::from(last - first) };
                         let finished = finished.fetch_add(new, Ordering::Relaxed) + new;
@@ -454,18 +512,29 @@ impl<'a> Job<'a> {
         (done, End::Done)
     }
 
+    /// How far and along what paths are followed.
+    fn limits(&self) -> Limits {
+        let follow = match self.method {
+            Method::Path(follow) | Method::Forward(follow) | Method::Light(follow) => follow,
+            Method::Occlusion(_) | Method::Values(..) => LobeKind::empty(),
+        };
+        let mirrors = matches!(self.method, Method::Forward(_));
+        Limits { bounces: self.options.max_depth.min(MOST_BOUNCES), follow, mirrors }
+    }
+
     /// Whether time is up for samples from this one on; every pixel gets the first.
     fn is_late(&self, first: u32) -> bool {
         first > self.options.first_sample && self.deadline.is_some_and(|end| Instant::now() >= end)
     }
 
     fn band<'b, K: Kernel>(
-        &self,
+        &'b self,
         tracer: &mut Tracer<'b, K>,
         clock: &'b Clock,
         band: &mut Band<'_>,
         samples: std::ops::Range<u32>,
         tiles: &Tiles,
+        splats: Option<&Splats>,
         monitor: &dyn Monitor,
     ) -> Done {
         let mut done = Done::default();
@@ -495,13 +564,13 @@ impl<'a> Job<'a> {
                     let begun = started.map(|s| s.elapsed());
                     shots.push(Shot { begun, ..shot }, ray);
                     if shots.are_many() {
-                        done.bad += self.shoot(tracer, clock, band, &mut shots);
+                        done.bad += self.shoot(tracer, clock, band, &mut shots, splats);
                     }
                     done.samples += 1;
                 }
             }
         }
-        done.bad += self.shoot(tracer, clock, band, &mut shots);
+        done.bad += self.shoot(tracer, clock, band, &mut shots, splats);
         done.rays = tracer.counts;
         done.tally = Tally::take();
         done.timing = tracer.timing;
@@ -521,24 +590,32 @@ impl<'a> Job<'a> {
         let sampler = PixelSampler::of(self.options.sampler, self.options.seed, (x, y), sample);
         let [dx, dy] = self.filter.offset(tracer.draw2(&sampler, Dimension::Pixel));
         let at = [f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy];
-        let ray = self.camera.ray(at);
+        let ray = if self.camera.has_lens() {
+            tally::sample(EffectSet::DEPTH_OF_FIELD);
+            let on_lens = warp::disk(tracer.draw2(&sampler, Dimension::Lens));
+            self.camera.ray_through_lens(at, on_lens.as_dvec2().to_array())
+        } else {
+            self.camera.ray(at)
+        };
         let screen = [(at[0] / f64::from(self.options.width)) as f32, (at[1] / f64::from(self.options.height)) as f32];
         (Shot { pixel: (x, y), sampler, screen, timed, begun: None }, ray)
     }
 
     /// Takes the samples that were begun, in their order; the answer: how many of them were no light.
     fn shoot<'b, K: Kernel>(
-        &self,
+        &'b self,
         tracer: &mut Tracer<'b, K>,
         clock: &'b Clock,
         band: &mut Band<'_>,
         shots: &mut Shots,
+        splats: Option<&Splats>,
     ) -> u64 {
         let mut bad = 0;
         let mut each = Duration::ZERO;
         shots.hits.clear();
         shots.hits.resize(shots.list.len(), None);
-        if matches!(self.method, Method::Path(_)) {
+        let (moves, paths) = (self.stage.moves(), matches!(self.method, Method::Path(_) | Method::Forward(_)));
+        if paths && !moves {
             // Camera rays go the same way: together.
             let timed = shots.list.iter().filter(|s| s.timed).count() as u64;
             each = tracer.camera_hits(&shots.rays, &mut shots.hits, timed);
@@ -546,9 +623,15 @@ impl<'a> Job<'a> {
         for ((shot, ray), hit) in shots.list.iter().zip(&shots.rays).zip(&shots.hits) {
             tracer.timed = shot.timed;
             tracer.clock = shot.begun.map(|_| clock);
+            let mut hit = *hit;
+            if moves {
+                tally::sample(EffectSet::MOTION);
+                tracer.stage = self.stage.moment(tracer.draw1(&shot.sampler, Dimension::Time)).1;
+                hit = if paths { tracer.closest(crate::RayKind::Camera, ray, None) } else { None };
+            }
             let (x, y) = shot.pixel;
             let started = shot.begun.map(|begun| (begun + each, Instant::now()));
-            bad += u64::from(!self.sample(tracer, band.pixel(x, y), shot, *ray, *hit));
+            bad += u64::from(!self.sample(tracer, band.pixel(x, y), shot, *ray, hit, splats));
             if let Some((before, started)) = started {
                 tracer.timing.parts.whole.note(before + started.elapsed());
             }
@@ -563,14 +646,14 @@ impl<'a> Job<'a> {
         &self,
         tracer: &mut Tracer<'_, K>,
         pixel: &mut [Accumulator],
-        &Shot { sampler, screen, .. }: &Shot,
+        &Shot { pixel: (x, y), sampler, screen, .. }: &Shot,
         ray: Ray<f64>,
         hit: Option<Hit>,
+        splats: Option<&Splats>,
     ) -> bool {
-        let limits = |follow| Limits { bounces: self.options.max_depth.min(MOST_BOUNCES), follow };
         let mut seen = match self.method {
-            Method::Path(follow) => tracer.path(ray, hit, self.cone, screen, sampler, limits(follow)),
-            Method::Light(follow) => tracer.radiance(ray, self.cone, screen, sampler, limits(follow)),
+            Method::Path(_) | Method::Forward(_) => tracer.path(ray, hit, self.cone, screen, sampler, self.limits()),
+            Method::Light(_) => tracer.radiance(ray, self.cone, screen, sampler, self.limits()),
             Method::Occlusion(reach) => tracer.ambient_occlusion(ray, reach, sampler),
             Method::Values(..) => tracer.values(ray, self.cone),
         };
@@ -578,6 +661,9 @@ impl<'a> Job<'a> {
         let cost = if heat { self.stage.accel.closest_hit_counted(&ray).1 } else { TraversalCounts::default() };
         if let (Method::Values(aov, far), Some(first)) = (self.method, &seen.first) {
             seen.color = first.shown(aov, cost, far);
+        }
+        if let Some(splats) = splats {
+            seen.color += splats.at(x, y);
         }
         let good = is_light(&seen);
         let Seen { color, alpha, .. } = if good { seen } else { Seen { alpha: 1.0, ..Seen::default() } };

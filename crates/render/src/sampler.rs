@@ -36,8 +36,14 @@ pub enum Dimension {
     Alpha(u32),
     /// Whether the path goes on.
     Roulette(u32),
+    /// How far a path gets in fog.
+    Fog(u32),
     /// Which colour a path follows once a surface parts them.
     Color,
+    /// Where on the lens the camera ray starts.
+    Lens,
+    /// When, while the shutter is open.
+    Time,
 }
 
 /// Where sample points come from.
@@ -73,6 +79,9 @@ impl Dimension {
         const PURPOSES: u32 = 8;
         match self {
             Self::Pixel => 0,
+            // Those that have no bounce take what is free in the rows.
+            Self::Lens => 7,
+            Self::Time => 2 * PURPOSES,
             // Of the first row, which has a bounce for no purpose but this one.
             Self::Color => PURPOSES,
             Self::LightChoice(bounce) => 1 + PURPOSES * bounce,
@@ -81,6 +90,8 @@ impl Dimension {
             Self::Direction(bounce) => 4 + PURPOSES * bounce,
             Self::Alpha(bounce) => 5 + PURPOSES * bounce,
             Self::Roulette(bounce) => 6 + PURPOSES * bounce,
+            // The first place of that row is the lens's.
+            Self::Fog(bounce) => 7 + PURPOSES * (bounce + 1),
         }
     }
 }
@@ -274,9 +285,10 @@ mod tests {
                     Dimension::Direction(b),
                     Dimension::Alpha(b),
                     Dimension::Roulette(b),
+                    Dimension::Fog(b),
                 ]
             })
-            .chain([Dimension::Pixel, Dimension::Color])
+            .chain([Dimension::Pixel, Dimension::Color, Dimension::Lens, Dimension::Time])
             .map(Dimension::index)
             .collect();
         let count = numbers.len();

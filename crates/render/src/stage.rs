@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use firsthit_accel::HitId;
+use firsthit_accel::{Hit, HitId, SurfacePoint};
 use firsthit_import::SceneDesc;
 use firsthit_import::scene::MaterialDesc;
-use glam::Vec3;
+use glam::{DAffine3, DVec3, Vec3};
 
 use crate::camera::{Camera, CameraError};
-use crate::kernel::Full;
+use crate::fog::Fog;
+use crate::kernel::{Full, Kernel};
 use crate::light::Lights;
 use crate::light::area::{AreaLights, Glow, ShapeLight};
 use crate::light::choice::LightChoice;
@@ -19,7 +20,7 @@ use crate::setting::{self, Setting};
 use crate::surface::World;
 use crate::texture::{TextureError, TextureLookup};
 use crate::{
-    Background, CameraChoice, EffectPlan, EffectSet, KernelChoice, StageOptions, TextureFilter, framing, survey,
+    Background, CameraChoice, EffectPlan, EffectSet, KernelChoice, StageOptions, TextureFilter, framing, motion, survey,
 };
 
 /// A scene that cannot be staged.
@@ -43,6 +44,9 @@ pub enum StageError {
     /// A material names an image that the scene does not have.
     #[error("image {0} does not exist")]
     NoSuchImage(usize),
+    /// What moves cannot be placed at some moment.
+    #[error("something that moves cannot be placed on its way: {0}")]
+    Motion(String),
     /// The environment map is unusable.
     #[error("{image}: {cause}")]
     Environment {
@@ -68,8 +72,8 @@ pub struct Stage {
     pub(crate) world: World,
     pub(crate) accel: firsthit_accel::Scene,
     /// One for each material of the scene, then the default material.
-    pub(crate) materials: Vec<Material>,
-    pub(crate) flags: Vec<Flags>,
+    pub(crate) materials: Arc<[Material]>,
+    pub(crate) flags: Arc<[Flags]>,
     pub(crate) lights: Lights,
     pub(crate) camera: Camera,
     pub(crate) background: Backdrop,
@@ -77,6 +81,9 @@ pub struct Stage {
     /// Shadow rays of smooth meshes start on the curved surface that is meant.
     pub(crate) terminator: bool,
     kernel: KernelChoice,
+    pub(crate) fog: Option<Fog>,
+    /// The same at each step of the time that the shutter is open, if anything moves.
+    moments: Vec<Stage>,
     plan: EffectPlan,
     explain: Vec<String>,
 }
@@ -143,7 +150,7 @@ impl Stage {
     ) -> Result<Self, StageError> {
         let reference = scene.settings.reference_conventions;
         let mut explain = Vec::new();
-        let camera = choose_camera(&scene, &accel, options, &mut explain)?;
+        let mut camera = choose_camera(&scene, &accel, options, &mut explain)?;
         let Setting { environment, background, words, dim, studio } = setting::choose(&scene, options)?;
         explain.extend(words);
 
@@ -152,6 +159,21 @@ impl Stage {
         let used = survey::used_materials(&scene);
         survey::call_for_materials(&mut plan, &scene, &used);
         survey::call_for_lights(&mut plan, &scene, environment.as_ref(), &explain_environment(dim));
+        let fog = scene.fog.as_ref().and_then(Fog::new);
+        if let Some(fog) = &fog {
+            plan.call(EffectSet::FOG, "the fog");
+            if fog.scatters() {
+                plan.call(EffectSet::INDIRECT_LIGHT, "the fog");
+            }
+        }
+        match motion::count(&scene) {
+            0 => {}
+            1 => plan.call(EffectSet::MOTION, "1 object that moves"),
+            n => plan.call(EffectSet::MOTION, format!("{n} objects that move")),
+        }
+        if camera.has_lens() {
+            plan.call(EffectSet::DEPTH_OF_FIELD, "the camera's lens");
+        }
         let lit = setting::has_lights(&scene);
         let view = if reference { None } else { survey::view(&accel, &camera, options.aspect) };
         let headlight = view
@@ -176,6 +198,9 @@ impl Stage {
             plan.leave(EffectSet::LAYERS);
         }
         let effects = plan.simulated();
+        if !effects.contains(EffectSet::DEPTH_OF_FIELD) {
+            camera = camera.without_lens();
+        }
 
         let energy_compensation = options.energy_compensation && !reference;
         let conventions = Conventions { reference, effects, energy_compensation };
@@ -187,7 +212,7 @@ impl Stage {
             .iter()
             .chain([&default])
             .map(|m| Material::new(m, &mut textures, conventions))
-            .collect::<Result<Vec<_>, _>>()?;
+            .collect::<Result<Arc<[_]>, _>>()?;
         let flags = materials.iter().map(|m| Flags {
             culls: !reference && m.culls(),
             alpha: m.has_alpha(),
@@ -195,7 +220,7 @@ impl Stage {
             textured: m.is_textured(),
             sharp: !mips || m.lets_through() || m.glows(),
         });
-        let flags: Vec<Flags> = flags.collect();
+        let flags: Arc<[Flags]> = flags.collect();
         // What no surface has keeps no kernel from being small.
         let of_used = |is: &dyn Fn(usize) -> bool| (0..used.len()).any(|i| used[i] && is(i));
         let kernel = KernelChoice::new(
@@ -204,40 +229,18 @@ impl Stage {
             effects.intersects(EffectSet::THROUGH) || of_used(&|i| materials[i].goes_through()),
             effects.intersects(EffectSet::LAYERS) || of_used(&|i| materials[i].is_layered()),
         );
-        let world = World::new(scene);
+        let places: Vec<DAffine3> = scene.instances.iter().map(|i| i.transform).collect();
+        let world = World::new(scene, places);
 
         let mut punctual = Vec::new();
         if effects.contains(EffectSet::PUNCTUAL_LIGHTS) {
             punctual.extend(world.scene.lights.iter().filter_map(|l| PunctualLight::new(&l.kind)));
             punctual.extend(headlight.as_ref().map(survey::Headlight::light));
         }
-        let area = if effects.contains(EffectSet::AREA_LIGHTS) {
-            let lights = world.scene.lights.iter().filter_map(|l| ShapeLight::new(&l.kind));
-            let of = |id: HitId| &materials[world.material(id)];
-            AreaLights::new(
-                lights,
-                &world,
-                |id| {
-                    let glow = |m: &Material| Glow { both_sides: m.glows_on_both_sides(), even: m.glows_evenly() };
-                    Some(of(id)).filter(|m| m.glows()).map(glow)
-                },
-                |id| {
-                    let uv = |t: &TextureLookup| world.corner_uvs(id, t.uv_set());
-                    of(id).emissive_texture().is_some_and(|t| uv(t).is_some_and(|uv| t.is_black_over(uv)))
-                },
-                |id, u, v| {
-                    let hit = firsthit_accel::Hit { id, t: 0.0, u, v, normal: glam::DVec3::Z };
-                    let (material, at) = (of(id), world.attributes(&hit, true));
-                    // How much is there of a mesh is looked up where it is asked.
-                    if world.is_shape(id) { material.glow::<Full>(&at) } else { material.emission::<Full>(&at) }
-                },
-            )
-        } else {
-            AreaLights::default()
-        };
+        let area = glowing(&world, &materials, effects);
         if area.unsampled > 0 {
             explain.push(format!(
-                "light: {} glowing shapes other than balls are seen and mirrored, but light nothing else",
+                "light: {} glowing shapes other than plain balls are seen and mirrored, but light nothing else",
                 area.unsampled
             ));
         }
@@ -263,13 +266,59 @@ impl Stage {
             reference,
             terminator,
             kernel,
+            fog: fog.filter(|_| effects.contains(EffectSet::FOG)),
+            moments: Vec::new(),
             plan,
             explain,
         };
         if let Some(view) = view.filter(|_| dim) {
             stage.lights.ambient = survey::even_light(&stage, &view, options.aspect);
         }
+        if effects.contains(EffectSet::MOTION) && motion::count(stage.scene()) > 0 {
+            let steps = options.motion_steps.max(1);
+            let moments = (0..steps).map(|k| stage.at((f64::from(k) + 0.5) / f64::from(steps), studio));
+            stage.moments = moments.collect::<Result<_, _>>()?;
+        }
         Ok(stage)
+    }
+
+    /// The same at another time, from 0, when the shutter opens, to 1, when it closes.
+    fn at(&self, time: f64, studio: bool) -> Result<Self, StageError> {
+        let places = motion::transforms(self.scene(), time);
+        let accel = self.accel.with_transforms(&places).map_err(|e| StageError::Motion(e.to_string()))?;
+        let world = World::new(Arc::clone(self.scene()), places);
+        let area = glowing(&world, &self.materials, self.plan.simulated());
+        let choice = LightChoice::new(&self.lights.punctual, &area, self.lights.environment.as_ref(), studio);
+        Ok(Self { world, accel, lights: Lights { area, choice, ..self.lights.clone() }, ..self.clone() })
+    }
+
+    /// What comes from a hit on a glowing triangle to one who looks there along a unit direction.
+    #[inline]
+    pub(crate) fn glow<K: Kernel>(&self, hit: &Hit, looking: Vec3) -> Vec3 {
+        let material = &self.materials[self.world.material(hit.id)];
+        if K::LAYERS && material.glow_depends_on_view() {
+            let point = SurfacePoint { position: DVec3::ZERO, normal: hit.normal, error: 0.0 };
+            return material.glow::<K>(&self.world.surface(hit, point, -looking, 0.0));
+        }
+        material.glow::<K>(&self.world.attributes(hit, true))
+    }
+
+    /// Whether anything moves.
+    pub(crate) fn moves(&self) -> bool {
+        !self.moments.is_empty()
+    }
+
+    /// What is seen at the moment that a number in [0, 1) chooses; and which of the moments it is.
+    #[inline]
+    pub(crate) fn moment(&self, u: f32) -> (usize, &Self) {
+        let moments = self.moments();
+        let k = ((u * moments.len() as f32) as usize).min(moments.len() - 1);
+        (k, &moments[k])
+    }
+
+    /// The stage at each moment that is looked at.
+    pub(crate) fn moments(&self) -> &[Self] {
+        if self.moments.is_empty() { std::slice::from_ref(self) } else { &self.moments }
     }
 
     /// Which effects the scene calls for, by what, and which are simulated.
@@ -302,6 +351,37 @@ impl Stage {
     pub fn kernel(&self) -> KernelChoice {
         self.kernel
     }
+}
+
+/// The glowing surfaces of a scene.
+fn glowing(world: &World, materials: &[Material], effects: EffectSet) -> AreaLights {
+    if !effects.contains(EffectSet::AREA_LIGHTS) {
+        return AreaLights::default();
+    }
+    let lights = world.scene.lights.iter().filter_map(|l| ShapeLight::new(&l.kind));
+    let of = |id: HitId| &materials[world.material(id)];
+    AreaLights::new(
+        lights,
+        world,
+        |id| {
+            let glow = |m: &Material| Glow {
+                both_sides: m.glows_on_both_sides(),
+                even: m.glows_evenly(),
+                by_view: m.glow_depends_on_view(),
+            };
+            Some(of(id)).filter(|m| m.glows()).map(glow)
+        },
+        |id| {
+            let uv = |t: &TextureLookup| world.corner_uvs(id, t.uv_set());
+            of(id).emissive_texture().is_some_and(|t| uv(t).is_some_and(|uv| t.is_black_over(uv)))
+        },
+        |id, u, v| {
+            let hit = Hit { id, t: 0.0, u, v, normal: DVec3::Z };
+            let (material, at) = (of(id), world.attributes(&hit, true));
+            // How much is there of a mesh is looked up where it is asked.
+            if world.is_shape(id) { material.glow::<Full>(&at) } else { material.emission::<Full>(&at) }
+        },
+    )
 }
 
 fn explain_environment(dim: bool) -> String {

@@ -26,11 +26,17 @@ pub enum RayKind {
     Transparency,
     /// For ambient occlusion.
     AmbientOcclusion,
+    /// On from where fog scattered a path.
+    Fog,
+    /// From a light.
+    Light,
+    /// From what light has met towards the camera.
+    ToCamera,
 }
 
 impl RayKind {
     /// All kinds, in the order of reports.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 13] = [
         Self::Camera,
         Self::ShadowPunctual,
         Self::ShadowArea,
@@ -41,6 +47,9 @@ impl RayKind {
         Self::Transmission,
         Self::Transparency,
         Self::AmbientOcclusion,
+        Self::Fog,
+        Self::Light,
+        Self::ToCamera,
     ];
 
     /// The name used in reports; the three kinds of shadow ray share one.
@@ -55,6 +64,9 @@ impl RayKind {
             Self::Transmission => "transmission",
             Self::Transparency => "transparency",
             Self::AmbientOcclusion => "ambient-occlusion",
+            Self::Fog => "fog",
+            Self::Light => "light",
+            Self::ToCamera => "to-camera",
         }
     }
 }
@@ -130,6 +142,33 @@ impl Breakdown {
     }
 }
 
+/// What paths from the lights did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LightPaths {
+    /// Paths that were begun.
+    pub paths: u64,
+    /// Points where light met a surface that spreads it.
+    pub vertices: u64,
+    /// Those of them that the camera saw.
+    pub seen: u64,
+}
+
+impl LightPaths {
+    /// The share of points that the camera saw; `None` where there are none.
+    #[must_use]
+    pub fn share(&self) -> Option<f64> {
+        (self.vertices > 0).then(|| self.seen as f64 / self.vertices as f64)
+    }
+}
+
+impl AddAssign for LightPaths {
+    fn add_assign(&mut self, other: Self) {
+        self.paths += other.paths;
+        self.vertices += other.vertices;
+        self.seen += other.seen;
+    }
+}
+
 /// What a render did.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RenderStats {
@@ -143,6 +182,8 @@ pub struct RenderStats {
     /// The estimated noise of the noisiest tile, as of
     /// [`RenderOptions::noise_threshold`](crate::RenderOptions::noise_threshold); `None` below 32 samples.
     pub noise: Option<f32>,
+    /// What paths from the lights did: nothing, but for the integrator `light`.
+    pub light: LightPaths,
     /// Wall-clock seconds.
     pub seconds: f64,
     /// Where the time went, by path tracing, if [`RenderOptions::profile`](crate::RenderOptions::profile) asks for it.
@@ -161,7 +202,7 @@ mod tests {
         counts += counts;
         assert_eq!(counts.shadow(), 10);
         assert_eq!(counts.by_name()[1], ("shadow", 10));
-        assert_eq!(counts.by_name().len(), 8);
+        assert_eq!(counts.by_name().len(), 11);
         assert_eq!(counts.total(), 10);
     }
 }

@@ -33,17 +33,19 @@ pub(crate) struct Instance {
 }
 
 impl World {
-    pub(crate) fn new(scene: Arc<SceneDesc>) -> Self {
+    /// The scene with its instances at these places.
+    pub(crate) fn new(scene: Arc<SceneDesc>, transforms: impl IntoIterator<Item = DAffine3>) -> Self {
         let instances = scene
             .instances
             .iter()
-            .map(|i| {
-                let inverse = i.transform.matrix3.inverse();
+            .zip(transforms)
+            .map(|(i, transform)| {
+                let inverse = transform.matrix3.inverse();
                 Instance {
                     mesh: i.mesh,
-                    transform: i.transform,
+                    transform,
                     inverse,
-                    vectors: i.transform.matrix3.as_mat3(),
+                    vectors: transform.matrix3.as_mat3(),
                     normals: inverse.transpose().as_mat3(),
                 }
             })

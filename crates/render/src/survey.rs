@@ -241,7 +241,7 @@ pub(crate) fn view(accel: &firsthit_accel::Scene, camera: &Camera, aspect: f64) 
 pub(crate) fn even_light(stage: &Stage, view: &View, aspect: f64) -> Vec3 {
     let clip = ClipRegion::default();
     let mut tracer = Tracer::<Full>::new(stage, &clip);
-    let limits = Limits { bounces: 1, follow: LobeKind::empty() };
+    let limits = Limits { bounces: 1, follow: LobeKind::empty(), mirrors: false };
     let cone = Cone { width: 0.0, spread: 0.0 };
     let (mut sum, mut seen) = (0.0, 0);
     for (pixel, ray) in looks(&stage.camera, aspect) {

@@ -65,6 +65,9 @@ const SAMPLED: EffectSet = EffectSet::PUNCTUAL_LIGHTS
     .union(EffectSet::UNLIT)
     .union(EffectSet::CLIPPING)
     .union(EffectSet::DISPERSION)
+    .union(EffectSet::DEPTH_OF_FIELD)
+    .union(EffectSet::MOTION)
+    .union(EffectSet::FOG)
     .union(EffectSet::LAYERS);
 
 /// Effects that look images up.

@@ -20,13 +20,14 @@ pub(crate) fn scene_of(materials: &[MaterialModel]) -> SceneDesc {
     SceneDesc { materials, ..SceneDesc::default() }
 }
 
-fn add(scene: &mut SceneDesc, surface: SurfaceDesc, material: usize) {
+pub(crate) fn add(scene: &mut SceneDesc, surface: SurfaceDesc, material: usize) {
     let geometry = GeometryDesc { name: String::new(), surface, material: Some(material) };
     scene.meshes.push(MeshDesc { name: String::new(), geometries: vec![geometry] });
     scene.instances.push(InstanceDesc {
         name: String::new(),
         mesh: scene.meshes.len() - 1,
         transform: DAffine3::IDENTITY,
+        moves_to: None,
     });
 }
 

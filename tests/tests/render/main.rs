@@ -3,7 +3,11 @@
 mod both_ways;
 mod common;
 mod effects;
+mod fog;
+mod forward;
 mod layers;
+mod lens;
+mod motion;
 mod path;
 mod references;
 
@@ -389,7 +393,7 @@ fn ambient_occlusion_is_one_on_a_plain_and_half_at_a_wall() {
 }
 
 /// A scene with a bit of everything.
-fn everything() -> SceneDesc {
+pub(crate) fn everything() -> SceneDesc {
     let gloss = pbr(|m| {
         m.base_color = Vec4::new(0.8, 0.3, 0.2, 1.0);
         m.roughness = 0.3;
@@ -502,7 +506,15 @@ fn effects_that_are_taken_away_cast_no_rays() {
     };
     let all = without(EffectSet::empty());
     for kind in RayKind::ALL {
-        let not_here = matches!(kind, RayKind::Transmission | RayKind::AmbientOcclusion | RayKind::Indirect);
+        let not_here = matches!(
+            kind,
+            RayKind::Transmission
+                | RayKind::AmbientOcclusion
+                | RayKind::Indirect
+                | RayKind::Fog
+                | RayKind::Light
+                | RayKind::ToCamera
+        );
         assert_eq!(all[kind] > 0, !not_here, "{kind:?}");
     }
     assert_eq!(without(EffectSet::SHADOWS).shadow(), 0);

@@ -75,7 +75,7 @@ pub(super) fn place(
     scene.instances.extend(drawn.iter().map(|node| {
         let name = source.root.nodes[*node].name.clone().unwrap_or_else(|| format!("node {node}"));
         let (mesh, transform) = placed[node];
-        InstanceDesc { name, mesh, transform }
+        InstanceDesc { name, mesh, transform, moves_to: None }
     }));
     let warn = |i: usize, _: &str, message| report.warn(source.file, format!("/nodes/{}", drawn[i]), message);
     scene.bake(source.limits, warn).map_err(|kind| source.at("/nodes", kind))?;

@@ -121,7 +121,7 @@ pub fn read_bytes(bytes: Vec<u8>, path: impl AsRef<Path>, options: &Options) -> 
     let mesh = MeshDesc { name: name.clone(), geometries: geometries.collect() };
     let transform = DAffine3::from_translation(meshes.origin);
     let scene = SceneDesc {
-        instances: vec![InstanceDesc { name: name.clone(), mesh: 0, transform }],
+        instances: vec![InstanceDesc { name: name.clone(), mesh: 0, transform, moves_to: None }],
         meshes: vec![mesh],
         materials: materials.materials,
         images: materials.images,

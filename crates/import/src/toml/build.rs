@@ -5,6 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
+use firsthit_geometry::transform::Transform;
 use glam::{DAffine3, Vec3};
 
 use super::schema::{Conventions, Film, Model, Object, SceneFile};
@@ -119,6 +120,10 @@ impl Builder<'_> {
             None if self.reference => Some(EnvironmentDesc::Constant { radiance: Vec3::ZERO }),
             None => None,
         };
+        self.scene.fog = match &file.fog {
+            Some(fog) => Some(lights::fog(fog).map_err(|e| self.invalid("fog", e))?),
+            None => None,
+        };
         for (place, object) in numbered("objects", &file.objects) {
             self.object(&place, object)?;
         }
@@ -135,6 +140,11 @@ impl Builder<'_> {
             Some(name) => Some(self.material_named(place, name)?),
             None => None,
         };
+        let moves_to = match &object.moves_to {
+            Some(t) => Some(place::affine(t).map_err(invalid)?),
+            None => None,
+        };
+        let first = self.scene.instances.len();
         let named = |kind: &str| object.name.clone().unwrap_or_else(|| kind.to_owned());
         match shapes::body(&object.shape).map_err(invalid)? {
             Body::Model(model) => self.model(place, model, material, transform),
@@ -142,7 +152,18 @@ impl Builder<'_> {
             Body::Shape(shape, standing) => {
                 self.surface(named(shape.kind()), SurfaceDesc::Shape(*shape), material, transform * standing)
             }
+        }?;
+        if let Some(moves_to) = moves_to {
+            // All of the object, by what takes it from here to there.
+            let by = moves_to * transform.inverse();
+            if !by.is_finite() || Transform::new(moves_to).is_err() {
+                return Err(self.invalid(place, "what is flat cannot move: see 'transform' and 'moves_to'"));
+            }
+            for instance in &mut self.scene.instances[first..] {
+                instance.moves_to = Some(by * instance.moves_to.unwrap_or(instance.transform));
+            }
         }
+        Ok(())
     }
 
     /// Adds a mesh of one surface, with its instance.
@@ -159,7 +180,7 @@ impl Builder<'_> {
         self.triangles += triangles(&mesh);
         self.placed_triangles += triangles(&mesh);
         self.scene.meshes.push(mesh);
-        let instance = InstanceDesc { name, mesh: self.scene.meshes.len() - 1, transform };
+        let instance = InstanceDesc { name, mesh: self.scene.meshes.len() - 1, transform, moves_to: None };
         self.place(&Placeable { instances: vec![instance], ..Placeable::default() }, DAffine3::IDENTITY)
     }
 

@@ -4,10 +4,10 @@ use glam::{DVec3, Vec3};
 
 use super::build::Builder;
 use super::place;
-use super::schema::{self, Camera, Environment, Light};
-use super::values::{Number, positive, within};
+use super::schema::{self, Camera, Environment, Fog, Light};
+use super::values::{Color, Number, positive, within};
 use crate::ImportError;
-use crate::scene::{CameraDesc, EnvironmentDesc, LightDesc, LightKind, Projection, SpotRamp};
+use crate::scene::{CameraDesc, EnvironmentDesc, FogDesc, LensDesc, LightDesc, LightKind, Projection, SpotRamp};
 
 /// A camera as the file describes it.
 pub(super) fn camera(c: &Camera) -> Result<CameraDesc, String> {
@@ -25,7 +25,36 @@ pub(super) fn camera(c: &Camera) -> Result<CameraDesc, String> {
             Projection::Perspective { vertical_fov: degrees.to_radians(), aspect: None }
         }
     };
-    Ok(CameraDesc { name: c.name.clone().unwrap_or_default(), transform, projection })
+    let lens = match (c.aperture, c.focus_distance) {
+        (None, None) => None,
+        (aperture, focus) => Some(LensDesc {
+            aperture: match aperture.map_or(0.0, |a| a.0) {
+                aperture if aperture >= 0.0 => aperture,
+                negative => return Err(format!("'aperture' must not be negative, but is {negative}")),
+            },
+            focus_distance: Some(match focus {
+                Some(distance) => positive("focus_distance", distance)?,
+                None => (c.target.0 - c.origin.0).length(),
+            }),
+        }),
+    };
+    Ok(CameraDesc { name: c.name.clone().unwrap_or_default(), transform, projection, lens })
+}
+
+/// Fog as the file describes it.
+pub(super) fn fog(f: &Fog) -> Result<FogDesc, String> {
+    let g = f.g.map_or(0.0, |g| g.0);
+    if !(-0.99..=0.99).contains(&g) {
+        return Err(format!("'g' must be between -0.99 and 0.99, but is {g}"));
+    }
+    let of = |c: Option<Color>| c.map_or(Vec3::ZERO, |c| c.0);
+    let bounds = match (f.min, f.max) {
+        (None, None) => None,
+        (Some(min), Some(max)) if min.0.cmplt(max.0).all() => Some((min.0, max.0)),
+        (Some(_), Some(_)) => return Err("each number of 'min' must be below that of 'max'".to_owned()),
+        _ => return Err("give both 'min' and 'max', or neither".to_owned()),
+    };
+    Ok(FogDesc { scattering: of(f.scattering), absorption: of(f.absorption), g: g as f32, bounds })
 }
 
 /// A light as the file describes it.

@@ -24,6 +24,7 @@ pub(super) struct SceneFile {
     pub(super) objects: Vec<Object>,
     pub(super) lights: Vec<Light>,
     pub(super) env: Option<Environment>,
+    pub(super) fog: Option<Fog>,
     #[serde(rename = "note")]
     _note: IgnoredAny,
     #[serde(rename = "exact")]
@@ -55,6 +56,18 @@ pub(super) struct Camera {
     pub(super) up: Option<Triple>,
     pub(super) vfov_deg: Option<Number>,
     pub(super) orthographic_height: Option<Number>,
+    pub(super) aperture: Option<Number>,
+    pub(super) focus_distance: Option<Number>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Fog {
+    pub(super) scattering: Option<Color>,
+    pub(super) absorption: Option<Color>,
+    pub(super) g: Option<Number>,
+    pub(super) min: Option<Triple>,
+    pub(super) max: Option<Triple>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -238,6 +251,7 @@ pub(super) struct Object {
     pub(super) name: Option<String>,
     pub(super) material: Option<String>,
     pub(super) transform: Option<Transform>,
+    pub(super) moves_to: Option<Transform>,
     #[serde(flatten)]
     pub(super) shape: Shape,
 }

@@ -159,7 +159,12 @@ mod tests {
         let geometries = vec![GeometryDesc { name: String::new(), surface, material: None }];
         Arc::new(SceneDesc {
             meshes: vec![MeshDesc { name: String::new(), geometries }],
-            instances: vec![InstanceDesc { name: String::new(), mesh: 0, transform: DAffine3::IDENTITY }],
+            instances: vec![InstanceDesc {
+                name: String::new(),
+                mesh: 0,
+                transform: DAffine3::IDENTITY,
+                moves_to: None,
+            }],
             ..SceneDesc::default()
         })
     }

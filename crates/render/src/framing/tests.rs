@@ -37,7 +37,7 @@ fn scene(surfaces: Vec<SurfaceDesc>, transform: DAffine3) -> SceneDesc {
         surfaces.into_iter().map(|surface| GeometryDesc { name: String::new(), surface, material: None }).collect();
     SceneDesc {
         meshes: vec![MeshDesc { name: String::new(), geometries }],
-        instances: vec![InstanceDesc { name: String::new(), mesh: 0, transform }],
+        instances: vec![InstanceDesc { name: String::new(), mesh: 0, transform, moves_to: None }],
         ..Default::default()
     }
 }

@@ -101,8 +101,7 @@ impl<K: Kernel> Tracer<'_, K> {
         if let Some(light) = &stage.lights.area.mesh {
             let (choice, u) = numbers(MESH);
             if let Some((mut sample, hit)) = light.sample(position, choice, u, lit.surface.id) {
-                let glow = stage.world.attributes(&hit, true);
-                sample.radiance *= stage.materials[stage.world.material(hit.id)].glow::<K>(&glow);
+                sample.radiance *= stage.glow::<K>(&hit, sample.direction);
                 total += self.arriving(lit, &sample, RayKind::ShadowArea);
             }
         }

@@ -3,6 +3,7 @@
 //! | module | answers |
 //! |---|---|
 //! | [`path`] | all light: of lights, and by any number of surfaces |
+//! | [`forward`] | the same light, from the lights to the camera |
 //! | [`whitted`] | light of all lights, mirrored, refracted and let through; with nothing followed, direct light alone |
 //! | [`direct`] | the light that reaches one point from all lights |
 //! | [`ao`] | how much of the hemisphere over a point is free |
@@ -17,6 +18,7 @@ pub(crate) mod ao;
 pub(crate) mod aov;
 pub(crate) mod clock;
 mod direct;
+pub(crate) mod forward;
 pub(crate) mod path;
 mod scatter;
 mod tracer;

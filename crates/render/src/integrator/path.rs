@@ -10,9 +10,11 @@
 //! comes through them by paths that meet it. Only lights without extent, which no path can meet, are taken as seen
 //! straight through smooth solids.
 
+mod fog;
+
 use firsthit_accel::{Hit, HitId};
 use firsthit_geometry::Ray;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::scatter::{Scatter, Towards, family, is_delta};
 use super::whitted::{Limits, Seen};
@@ -30,6 +32,7 @@ use crate::sampler::{Dimension, PixelSampler};
 use crate::stage::Backdrop;
 use crate::surface::Surface;
 use crate::tally;
+use fog::Flown;
 
 /// After this bounce chance ends paths that have become dim.
 const ROULETTE: u32 = 2;
@@ -53,6 +56,8 @@ struct Walk {
     cone: Cone,
     /// Absorption of what the ray is in.
     absorption: Vec3,
+    /// It is in a solid.
+    inside: bool,
     /// Only straight on so far: it sees the background.
     straight: bool,
     /// Where it last scattered, if the light there might have been asked.
@@ -63,6 +68,8 @@ struct Walk {
     colors: Colors,
     /// How much wider its view of textures becomes for each unit of distance, since it was scattered.
     spread: f32,
+    /// Of the next surface mirror images alone are wanted: see [`Limits::mirrors`].
+    mirrors: bool,
 }
 
 /// A point at which one light was asked.
@@ -83,6 +90,8 @@ struct Vertex<'a, 'b, K: Kernel> {
     sampler: PixelSampler,
     bounce: u32,
     absorption: Vec3,
+    /// It is seen from within a solid.
+    inside: bool,
     /// Light goes into a solid here, out of which it comes bent another time: only paths that follow it tell.
     enters: bool,
 }
@@ -109,14 +118,26 @@ impl<K: Kernel> Tracer<'_, K> {
             layers: 0,
             cone,
             absorption: Vec3::ZERO,
+            inside: false,
             straight: true,
             scattered: None,
             scale: 1.0,
             colors: self.colors(sampler),
             spread: 0.0,
+            mirrors: limits.mirrors,
         };
         let mut hit = first;
         loop {
+            if let Some(fog) = self.fog.filter(|_| !walk.inside) {
+                match self.fly(fog, &mut walk, hit.as_ref(), sampler, limits, &mut seen) {
+                    Flown::Through => {}
+                    Flown::Scattered => {
+                        hit = self.closest(walk.kind, &walk.ray, walk.source);
+                        continue;
+                    }
+                    Flown::Ended => return seen,
+                }
+            }
             if self.meets_light(&walk, hit.as_ref(), &mut seen) {
                 return seen;
             }
@@ -225,7 +246,10 @@ impl<K: Kernel> Tracer<'_, K> {
         if lobes.is_empty() || (ends && !sheet) {
             return false;
         }
-        let scatter = Scatter::new(&shading.bsdf, wo, walk.throughput, limits.follow);
+        let mut scatter = Scatter::new(&shading.bsdf, wo, walk.throughput, limits.follow);
+        if walk.mirrors {
+            scatter.keep_mirrors();
+        }
         let sampler = if walk.layers == 0 { sampler } else { sampler.branch(walk.layers) };
         let mut asked = None;
         if scatter.spreads && !ends {
@@ -239,6 +263,7 @@ impl<K: Kernel> Tracer<'_, K> {
                 sampler,
                 bounce: walk.bounce,
                 absorption: walk.absorption,
+                inside: walk.inside,
                 enters: solid && surface.front,
             };
             seen.color += walk.throughput * self.ask(&vertex, &shading.bsdf, limits);
@@ -264,6 +289,7 @@ impl<K: Kernel> Tracer<'_, K> {
             // A clear sheet: the light that was asked before was asked through it, where that is simulated.
             if !material.is_clear() {
                 walk.scattered = None;
+                walk.mirrors = false;
             }
             walk.pass(&surface, RayKind::Transmission);
             return true;
@@ -276,6 +302,7 @@ impl<K: Kernel> Tracer<'_, K> {
         }
         let entered = through && solid;
         if entered {
+            walk.inside = surface.front;
             walk.absorption = if surface.front { material.absorption } else { Vec3::ZERO };
         }
         walk.scale *= lobe.scale();
@@ -290,6 +317,7 @@ impl<K: Kernel> Tracer<'_, K> {
         }
         walk.straight &= unbent;
         walk.layers = 0;
+        walk.mirrors = false;
         walk.source = Some(surface.id);
         walk.ray = Ray::new(surface.point.spawn(direction), direction);
         walk.scattered = match (on.pdf, asked) {
@@ -303,6 +331,12 @@ impl<K: Kernel> Tracer<'_, K> {
             _ => None,
         };
         walk.bounce += 1;
+        self.survives(walk, sampler)
+    }
+
+    /// Whether chance lets a path go on.
+    #[inline]
+    fn survives(&self, walk: &mut Walk, sampler: PixelSampler) -> bool {
         if walk.bounce > ROULETTE {
             let chance = walk.throughput.max_element() / (DIM * walk.scale);
             if chance < 1.0 {
@@ -345,7 +379,27 @@ impl<K: Kernel> Tracer<'_, K> {
         };
         let from = at.surface.point.position;
         let u = self.draw2(&at.sampler, Dimension::LightPosition(at.bounce));
-        let (sample, kind) = match chosen {
+        let (sample, kind) = self.sample_light(chosen, probability, from, at.surface.id, u, all_followed);
+        match sample {
+            Some(sample) => light + self.arrives_at(at, bsdf, &sample, kind),
+            None => light,
+        }
+    }
+
+    /// A way from a point (on this primitive) to a light that was chosen with a probability. The surroundings are asked by
+    /// what stands out of them, where the rest is met by paths.
+    #[inline]
+    fn sample_light(
+        &self,
+        chosen: Chosen,
+        probability: f32,
+        from: DVec3,
+        on: HitId,
+        u: [f32; 2],
+        all_followed: bool,
+    ) -> (Option<LightSample>, RayKind) {
+        let (stage, lights) = (self.stage, &self.stage.lights);
+        match chosen {
             Chosen::Punctual(i) => {
                 let sample = lights.punctual[i].sample(from, u);
                 (sample.map(|s| s.chosen_with(probability)), RayKind::ShadowPunctual)
@@ -359,13 +413,10 @@ impl<K: Kernel> Tracer<'_, K> {
                     .area
                     .mesh
                     .as_ref()
-                    .and_then(|mesh| mesh.sample_triangle(i, 1.0 / f64::from(probability), from, u, at.surface.id));
+                    .and_then(|mesh| mesh.sample_triangle(i, 1.0 / f64::from(probability), from, u, on));
                 let even = lights.area.mesh.as_ref().and_then(|mesh| mesh.even_radiance(i));
                 let sample = sample.map(|(mut sample, hit)| {
-                    sample.radiance *= even.unwrap_or_else(|| {
-                        let glow = stage.world.attributes(&hit, true);
-                        stage.materials[stage.world.material(hit.id)].glow::<K>(&glow)
-                    });
+                    sample.radiance *= even.unwrap_or_else(|| stage.glow::<K>(&hit, sample.direction));
                     sample
                 });
                 (sample, RayKind::ShadowArea)
@@ -374,10 +425,6 @@ impl<K: Kernel> Tracer<'_, K> {
                 let sample = lights.environment.as_ref().filter(|_| all_followed).and_then(|e| e.sample_bright(u));
                 (sample.map(|s| from_around(s, probability)), RayKind::ShadowEnvironment)
             }
-        };
-        match sample {
-            Some(sample) => light + self.arrives_at(at, bsdf, &sample, kind),
-            None => light,
         }
     }
 
@@ -418,6 +465,9 @@ impl<K: Kernel> Tracer<'_, K> {
             && let LightEnd::At(end) = sample.end
         {
             light *= (at.absorption * -((end - origin).length() as f32)).map(f32::exp);
+        }
+        if self.fog.is_some() && (behind || !at.inside) {
+            light *= self.through_fog(origin, sample);
         }
         light * self.lit(kind, origin, sample, surface.id)
     }

@@ -86,6 +86,19 @@ impl<'a, K: Kernel> Scatter<'a, K> {
         Self { bsdf, wo, chances, spreads }
     }
 
+    /// Leaves only what goes on in one direction.
+    pub(super) fn keep_mirrors(&mut self) {
+        let mut sum = 0.0;
+        for (chance, lobe) in self.chances.iter_mut().zip(self.bsdf.lobes()) {
+            *chance *= f32::from(u8::from(is_delta(lobe)));
+            sum += *chance;
+        }
+        for chance in self.chances.iter_mut().filter(|c| **c > 0.0) {
+            *chance /= sum;
+        }
+        self.spreads = false;
+    }
+
     /// f |cos| towards a direction of the lobes' frame, and the density with which following would have found it.
     #[inline]
     pub(super) fn towards(&self, wi: Vec3) -> Towards {

@@ -9,6 +9,7 @@ use firsthit_geometry::clip::ClipRegion;
 use glam::{DVec3, Vec3};
 
 use super::clock::{Clock, Parts, Spent};
+use crate::fog::Fog;
 use crate::kernel::Kernel;
 use crate::light::{LightEnd, LightSample};
 use crate::material::Colors;
@@ -65,7 +66,7 @@ fn towards(from: DVec3, sample: &LightSample) -> Ray<f64> {
 
 /// Which clear surfaces a shadow ray passes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Clear {
+pub(super) enum Clear {
     /// Rough or smooth, sheets and solids.
     All,
     /// Those that do not scatter.
@@ -88,6 +89,8 @@ pub(crate) struct Tracer<'a, K: Kernel> {
     pub(crate) timed: bool,
     /// Times what is not rays on such pixels, if that is asked for.
     pub(crate) clock: Option<&'a Clock>,
+    /// Fog, for those who simulate it.
+    pub(crate) fog: Option<&'a Fog>,
     kernel: PhantomData<K>,
 }
 
@@ -107,7 +110,17 @@ impl<'a, K: Kernel> Tracer<'a, K> {
             timing: Timing::default(),
             timed: false,
             clock: None,
+            fog: None,
             kernel: PhantomData,
+        }
+    }
+
+    /// The share of a light sample's light that gets through fog to a point.
+    pub(super) fn through_fog(&self, from: DVec3, sample: &LightSample) -> Vec3 {
+        let Some(fog) = self.fog else { return Vec3::ONE };
+        match sample.end {
+            LightEnd::At(point) => fog.passed(&Ray::segment(from, point), 1.0),
+            LightEnd::Infinity => fog.passed(&Ray::new(from, sample.direction.as_dvec3()), f64::INFINITY),
         }
     }
 
@@ -131,7 +144,7 @@ impl<'a, K: Kernel> Tracer<'a, K> {
 
     /// A number for one use.
     #[inline]
-    pub(super) fn draw1(&self, sampler: &PixelSampler, dimension: Dimension) -> f32 {
+    pub(crate) fn draw1(&self, sampler: &PixelSampler, dimension: Dimension) -> f32 {
         match self.clock {
             None => sampler.get1(dimension),
             Some(clock) => clock.sampling(|| sampler.get1(dimension)),
@@ -139,7 +152,7 @@ impl<'a, K: Kernel> Tracer<'a, K> {
     }
 
     /// The ray inside what is shown.
-    fn clipped(&self, ray: &Ray<f64>) -> Option<Ray<f64>> {
+    pub(super) fn clipped(&self, ray: &Ray<f64>) -> Option<Ray<f64>> {
         match self.clip {
             None => Some(*ray),
             Some(region) => {
@@ -149,7 +162,7 @@ impl<'a, K: Kernel> Tracer<'a, K> {
         }
     }
 
-    fn timed<R>(&mut self, kind: RayKind, cast: impl FnOnce(&mut Self) -> R) -> R {
+    pub(super) fn timed<R>(&mut self, kind: RayKind, cast: impl FnOnce(&mut Self) -> R) -> R {
         self.counts[kind] += 1;
         if !self.timed {
             return cast(self);
@@ -222,7 +235,7 @@ impl<'a, K: Kernel> Tracer<'a, K> {
 
     /// Whether a surface is not there for what meets its back: sight, or the light on its way. A shadow ray runs
     /// against the light.
-    fn is_culled(&self, hit: &Hit, material: usize, towards: DVec3) -> bool {
+    pub(super) fn is_culled(&self, hit: &Hit, material: usize, towards: DVec3) -> bool {
         self.stage.flags[material].culls && !self.stage.world.faces(hit.id, towards)
     }
 
@@ -285,7 +298,13 @@ impl<'a, K: Kernel> Tracer<'a, K> {
         })
     }
 
-    fn filtered_transmittance(&self, ray: &Ray<f64>, target: Option<HitId>, source: HitId, clear: Clear) -> Vec3 {
+    pub(super) fn filtered_transmittance(
+        &self,
+        ray: &Ray<f64>,
+        target: Option<HitId>,
+        source: HitId,
+        clear: Clear,
+    ) -> Vec3 {
         /// Less light than this is none.
         const NEGLIGIBLE: f32 = 1e-4;
         let (stage, world) = (self.stage, &self.stage.world);

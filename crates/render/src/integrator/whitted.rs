@@ -85,6 +85,8 @@ pub(crate) struct Limits {
     pub(crate) bounces: u32,
     /// Lobes that are followed.
     pub(crate) follow: LobeKind,
+    /// What the first surface spreads is left out: paths from the lights bring it. Mirror images are there.
+    pub(crate) mirrors: bool,
 }
 
 impl<K: Kernel> Tracer<'_, K> {

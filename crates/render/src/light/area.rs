@@ -1,5 +1,7 @@
 //! Glowing surfaces, sampled as lights.
 
+mod emit;
+
 use std::collections::HashMap;
 use std::f64::consts::PI;
 
@@ -15,6 +17,8 @@ use super::{LightEnd, LightSample};
 use crate::distribution::Distribution1D;
 use crate::surface::World;
 use crate::{EffectSet, tally, warp};
+
+pub(crate) use emit::Shines;
 
 /// A glowing rectangle or ball.
 #[derive(Clone, Debug)]
@@ -308,6 +312,8 @@ pub(crate) struct Glow {
     pub(crate) both_sides: bool,
     /// The same everywhere: there is no texture.
     pub(crate) even: bool,
+    /// Not the same in all directions.
+    pub(crate) by_view: bool,
 }
 
 /// Glowing surfaces of a scene.
@@ -338,7 +344,7 @@ impl AreaLights {
         for (i, instance) in world.instances.iter().enumerate() {
             for (g, geometry) in world.scene.meshes[instance.mesh].geometries.iter().enumerate() {
                 let id = HitId { instance: i as u32, geometry: g as u32, primitive: 0 };
-                let Some(Glow { both_sides, even }) = glowing(id) else { continue };
+                let Some(Glow { both_sides, even, by_view }) = glowing(id) else { continue };
                 match &geometry.surface {
                     SurfaceDesc::Triangles(mesh) => {
                         first.insert((id.instance, id.geometry), parts.len());
@@ -381,8 +387,8 @@ impl AreaLights {
                         }
                     }
                     SurfaceDesc::Shape(shape) => match ShapeLight::of_scene(world, id, shape, radiance(id, 0.5, 0.5)) {
-                        Some(light) => area.shapes.push(light),
-                        None => area.unsampled += 1,
+                        Some(light) if !by_view => area.shapes.push(light),
+                        _ => area.unsampled += 1,
                     },
                 }
             }

@@ -80,6 +80,11 @@ impl LightChoice {
         irradiance * (direction.dot(to.normal) + spread).clamp(to.least_cos, 1.0)
     }
 
+    /// Whether a light without extent is asked at all.
+    pub(crate) fn asks(&self, punctual: usize) -> bool {
+        self.placed.iter().chain(&self.distant).any(|i| *i as usize == punctual)
+    }
+
     /// Whether there is nothing to choose: it is always the same light.
     #[inline]
     pub(crate) fn is_single(&self) -> bool {

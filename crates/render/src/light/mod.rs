@@ -2,6 +2,7 @@
 
 pub(crate) mod area;
 pub(crate) mod choice;
+pub(crate) mod emitters;
 pub mod environment;
 pub(crate) mod punctual;
 pub mod studio;

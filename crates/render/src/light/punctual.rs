@@ -1,5 +1,7 @@
 //! Lights without extent: points, spots, and light from one direction.
 
+use std::f32::consts::PI;
+
 use firsthit_import::scene::{LightKind, SpotRamp};
 use glam::{DVec3, Vec3};
 
@@ -107,6 +109,45 @@ impl PunctualLight {
         // The middle of its disk.
         let sample = self.sample(point, [0.0; 2])?;
         Some((sample.direction, luminance(sample.radiance), spread))
+    }
+
+    /// About the light that it sends in all directions, where the whole scene is a ball of this radius.
+    pub(crate) fn power(&self, radius: f64) -> f32 {
+        let power = match self {
+            Self::Point { intensity, .. } => luminance(*intensity) * 2.0 * PI * self.one_minus_cos(),
+            Self::Directional { irradiance, .. } => luminance(*irradiance) * PI * (radius * radius) as f32,
+            Self::Headlight { irradiance, distance, .. } => irradiance * 4.0 * PI * (distance * distance) as f32,
+        };
+        if power.is_finite() { power } else { 0.0 }
+    }
+
+    /// Where it has a place: that, and the direction of some light from there, evenly over all that it lights, which
+    /// is [`PunctualLight::solid_angle`].
+    pub(crate) fn leaving(&self, u: [f32; 2]) -> Option<(DVec3, Vec3)> {
+        match self {
+            Self::Point { position, cone, .. } => {
+                let axis = cone.as_ref().map_or(Vec3::Z, |c| c.axis);
+                let (x, y) = warp::frame(axis);
+                let w = warp::cone(u, self.one_minus_cos());
+                Some((*position, x * w.x + y * w.y + axis * w.z))
+            }
+            Self::Headlight { position, .. } => Some((*position, warp::sphere(u))),
+            Self::Directional { .. } => None,
+        }
+    }
+
+    /// Of the directions in which it shines.
+    pub(crate) fn solid_angle(&self) -> f32 {
+        2.0 * PI * self.one_minus_cos()
+    }
+
+    /// 1 - cos of the angle up to which it shines.
+    fn one_minus_cos(&self) -> f32 {
+        match self {
+            // Without cancellation.
+            Self::Point { cone: Some(cone), .. } => 2.0 * (0.5 * cone.outer.clamp(1e-4, PI)).sin().powi(2),
+            _ => 2.0,
+        }
     }
 
     /// Light that arrives at a point. `radiance` is the irradiance on a surface that faces the light.

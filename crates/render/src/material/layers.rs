@@ -69,6 +69,14 @@ struct Through {
     color_texture: Option<TextureLookup>,
 }
 
+impl Coat {
+    /// Its own normal, on the viewer's side.
+    fn normal<K: Kernel>(&self, surface: &Surface<'_>, bend: bool) -> Vec3 {
+        let normal = mapped::<K>(surface, self.normal_texture.as_ref(), self.normal_scale).unwrap_or(surface.smooth);
+        if bend { surface.bent(normal) } else { normal }
+    }
+}
+
 /// Where a reflection is rougher, and by how much.
 pub(super) struct Brush {
     /// In the world, not unit.
@@ -165,14 +173,20 @@ impl Layers {
         let (coat, weight) = self.coat_weight::<K>(surface)?;
         let roughness = (coat.roughness * scalar::<K>(EffectSet::CLEARCOAT, coat.roughness_texture.as_ref(), surface))
             .clamp(0.0, 1.0);
-        let mut normal =
-            mapped::<K>(surface, coat.normal_texture.as_ref(), coat.normal_scale).unwrap_or(surface.smooth);
-        if bend {
-            normal = surface.bent(normal);
-        }
+        let normal = coat.normal::<K>(surface, bend);
         let alpha = (roughness * roughness).max(LEAST_ALPHA);
         let lobe = Clearcoat { weight, alpha, normal: local(normal).try_normalize().unwrap_or(Vec3::Z) };
         Some((Lobe::Clearcoat(lobe), Clearcoat::passed(weight, normal.dot(surface.wo))))
+    }
+
+    /// What the coat leaves of light that comes from below it towards the viewer.
+    pub(super) fn under_coat<K: Kernel>(&self, surface: &Surface<'_>, bend: bool) -> f32 {
+        self.coat_weight::<K>(surface)
+            .map_or(1.0, |(coat, weight)| Clearcoat::passed(weight, coat.normal::<K>(surface, bend).dot(surface.wo)))
+    }
+
+    pub(super) fn has_coat(&self) -> bool {
+        self.coat.is_some()
     }
 
     /// The sheen as a lobe, and what it leaves of the light below, at this cosine to the viewer.

@@ -256,10 +256,17 @@ impl Material {
         self.pbr().is_none_or(Pbr::glows_evenly)
     }
 
+    /// Whether it does not glow the same in all directions.
+    pub(crate) fn glow_depends_on_view(&self) -> bool {
+        self.pbr().is_some_and(Pbr::glow_depends_on_view)
+    }
+
     /// Radiance sent to the viewer by the surface itself.
     pub(crate) fn emission<K: Kernel>(&self, surface: &Surface<'_>) -> Vec3 {
         match &self.model {
-            Model::Pbr(pbr) | Model::Layered(pbr) if surface.front || pbr.double_sided => pbr.emission::<K>(surface),
+            Model::Pbr(pbr) | Model::Layered(pbr) if surface.front || pbr.double_sided => {
+                pbr.emission::<K>(surface, self.conventions)
+            }
             Model::Emission(radiance) if surface.front => {
                 tally::sample(EffectSet::EMISSION);
                 *radiance

@@ -196,7 +196,12 @@ impl Pbr {
     }
 
     pub(super) fn glows_evenly(&self) -> bool {
-        self.emissive_texture.is_none() && !self.has_alpha()
+        self.emissive_texture.is_none() && !self.has_alpha() && !self.glow_depends_on_view()
+    }
+
+    /// Whether its glow is not the same in all directions.
+    pub(super) fn glow_depends_on_view(&self) -> bool {
+        self.layers.as_ref().is_some_and(|l| l.has_coat())
     }
 
     fn base<K: Kernel>(&self, surface: &Surface<'_>) -> glam::Vec4 {
@@ -243,7 +248,8 @@ impl Pbr {
         roughness * roughness <= LEAST_ALPHA
     }
 
-    pub(super) fn emission<K: Kernel>(&self, surface: &Surface<'_>) -> Vec3 {
+    /// What it sends to the viewer by itself: of what glows below a coat, what that lets out.
+    pub(super) fn emission<K: Kernel>(&self, surface: &Surface<'_>, conventions: Conventions) -> Vec3 {
         if self.unlit {
             tally::sample(EffectSet::UNLIT);
             return self.base::<K>(surface).xyz();
@@ -252,7 +258,11 @@ impl Pbr {
             return Vec3::ZERO;
         }
         tally::sample(EffectSet::EMISSION);
-        self.emissive * color::<K>(self.emissive_texture.as_ref(), surface).xyz()
+        let emission = self.emissive * color::<K>(self.emissive_texture.as_ref(), surface).xyz();
+        match self.layers.as_deref().filter(|_| K::LAYERS) {
+            Some(layers) => emission * layers.under_coat::<K>(surface, !conventions.reference),
+            None => emission,
+        }
     }
 
     /// glTF keeps both in one image, which is then looked up once.

@@ -157,6 +157,24 @@ fn what_makes_no_sense_is_told_with_its_element() {
             camera("origin = [1, 1, 1], target = [0, 0, 0], vfov_deg = 9, orthographic_height = 1"),
             "camera: give 'vfov_deg' or",
         ),
+        (
+            camera("origin = [1, 1, 1], target = [0, 0, 0], aperture = -1"),
+            "camera: 'aperture' must not be negative, but is -1",
+        ),
+        (
+            camera("origin = [1, 1, 1], target = [0, 0, 0], focus_distance = 0"),
+            "camera: 'focus_distance' must be above 0",
+        ),
+        ("fog = { scattering = 1, g = 1 }".to_owned(), "fog: 'g' must be between -0.99 and 0.99, but is 1"),
+        ("fog = { scattering = 1, min = [0, 0, 0] }".to_owned(), "fog: give both 'min' and 'max'"),
+        (
+            "fog = { scattering = 1, min = [0, 0, 0], max = [1, 1, 0] }".to_owned(),
+            "fog: each number of 'min' must be below",
+        ),
+        (
+            "objects = [{ shape = 'sphere', center = [0, 0, 0], radius = 1, moves_to = { scale = 0 } }]".to_owned(),
+            "objects[0]: what is flat cannot move",
+        ),
         (material("type = 'diffuse', albedo = 2"), "materials.m: 'albedo' must be between 0 and 1"),
         (material("type = 'glass', ior = 0.5"), "materials.m: 'ior' must be between 1 and 10, but is 0.5"),
         (material("type = 'rough_mirror', alpha = 2"), "materials.m: 'alpha' must be between 0 and 1, but is 2"),

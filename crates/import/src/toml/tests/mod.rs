@@ -9,7 +9,7 @@ use glam::{DVec3, Vec2, Vec3, Vec4};
 use tempfile::TempDir;
 
 use crate::scene::{
-    AlphaMode, Channel, EnvironmentDesc, Filter, LightKind, MaterialModel, PbrMaterial, Projection, SpotRamp,
+    AlphaMode, Channel, EnvironmentDesc, Filter, LensDesc, LightKind, MaterialModel, PbrMaterial, Projection, SpotRamp,
     SurfaceDesc, Wrap,
 };
 use crate::{ErrorKind, ImportError, Imported, Limits, Options, SceneDesc, UpAxis, open};
@@ -389,23 +389,54 @@ fn lights_of_all_kinds_are_read() {
 #[test]
 fn cameras_look_where_the_file_says() {
     let scene = toml(
-        "camera = { origin = [0, 1, 5], target = [0, 1, 0], vfov_deg = 60 }
+        "camera = { origin = [0, 1, 5], target = [0, 1, 0], vfov_deg = 60, aperture = 0.1 }
          [[cameras]]
          name = 'plan'
          origin = [0, 9, 0]
          target = [0, 0, 0]
          up = [0, 0, -1]
-         orthographic_height = 4",
+         orthographic_height = 4
+         focus_distance = 8.5",
     );
     assert_eq!(scene.settings.camera, Some(0));
     let [front, plan] = &scene.cameras[..] else { panic!("two cameras") };
     assert_eq!(front.transform.matrix3, glam::DMat3::IDENTITY);
     assert!(matches!(front.projection, Projection::Perspective { vertical_fov, aspect: None }
         if vertical_fov == 60_f64.to_radians()));
+    assert_eq!(front.lens, Some(LensDesc { aperture: 0.1, focus_distance: Some(5.0) }));
+    assert_eq!(plan.lens, Some(LensDesc { aperture: 0.0, focus_distance: Some(8.5) }));
     assert_eq!(plan.name, "plan");
     assert!(near(plan.transform.transform_vector3(DVec3::NEG_Z), [0.0, -1.0, 0.0]));
     assert!(near(plan.transform.transform_vector3(DVec3::Y), [0.0, 0.0, -1.0]));
     assert_eq!(plan.projection, Projection::Orthographic { half_height: 2.0, aspect: None });
+}
+
+#[test]
+fn fog_and_motion_are_read() {
+    let scene = toml(
+        "fog = { scattering = [0.1, 0.2, 0.3], absorption = 0.5, g = 0.4, min = [0, 0, 0], max = [1, 2, 3] }
+         [[objects]]
+         shape = 'sphere'
+         center = [1, 0, 0]
+         radius = 1
+         transform = { translate = [0, 1, 0] }
+         moves_to = { translate = [0, 1, 4], scale = 2 }
+         [[objects]]
+         shape = 'sphere'
+         center = [0, 0, 0]
+         radius = 1",
+    );
+    let fog = scene.fog.unwrap();
+    assert_eq!((fog.scattering, fog.absorption, fog.g), (Vec3::new(0.1, 0.2, 0.3), Vec3::splat(0.5), 0.4));
+    assert_eq!(fog.bounds, Some((DVec3::ZERO, DVec3::new(1.0, 2.0, 3.0))));
+    let [moving, still] = &scene.instances[..] else { panic!("two objects") };
+    let (from, to) = (moving.transform, moving.moves_to.unwrap());
+    // Whatever the shape's own place in it: from there to here.
+    let point = DVec3::new(0.3, 0.2, 0.1);
+    let inside = from.inverse().transform_point3(point + DVec3::Y);
+    assert!((to.transform_point3(inside) - (point * 2.0 + DVec3::new(0.0, 1.0, 4.0))).length() < 1e-12);
+    assert_eq!(still.moves_to, None);
+    assert!(toml("").fog.is_none());
 }
 
 #[test]
