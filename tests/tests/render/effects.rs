@@ -5,14 +5,14 @@ use std::sync::Arc;
 
 use firsthit_import::SceneDesc;
 use firsthit_import::scene::{
-    AlphaMode, Anisotropy, Clearcoat, DiffuseTransmission, EnvironmentDesc, ImageDesc, Iridescence, LightKind,
+    AlphaMode, Anisotropy, Clearcoat, DiffuseTransmission, EnvironmentDesc, FogDesc, ImageDesc, Iridescence, LightKind,
     MaterialModel, PbrMaterial, Pixels, Sheen, SurfaceDesc, TextureRef,
 };
 use firsthit_render::{
     AblateOptions, Ablations, CameraChanges, Clip, EffectOverrides, EffectSet, FilterChoice, IntegratorChoice,
     KernelChoice, RenderOptions, Rendered, StageOptions, ablate,
 };
-use glam::{DVec3, Vec3, Vec4};
+use glam::{DAffine3, DVec3, Vec3, Vec4};
 
 use crate::common::{accel, mapped_quad, quad, render_scene, scene_of, stage};
 use crate::{assert_near, bits, diffuse, light, pbr, small, surrounded};
@@ -110,6 +110,13 @@ fn zoo() -> SceneDesc {
         pixels: Pixels::Rgba8((0..8).map(sky).collect()),
     });
     scene.environment = Some(EnvironmentDesc::LatLong { image: 1, rotation: 0.0, scale: Vec3::ONE });
+    scene.instances[2].moves_to = Some(DAffine3::from_translation(DVec3::Y * 0.2));
+    scene.fog = Some(FogDesc {
+        scattering: Vec3::splat(0.1),
+        absorption: Vec3::splat(0.02),
+        g: 0.3,
+        bounds: Some((DVec3::splat(-4.0), DVec3::splat(4.0))),
+    });
     scene
 }
 
@@ -129,7 +136,9 @@ fn cut() -> Clip {
 
 /// The zoo with these effects, or those without which it is nothing.
 fn zoo_with(effects: EffectOverrides, options: &RenderOptions) -> Rendered {
-    render_scene(&zoo(), &StageOptions { effects, ..looking_down() }, options)
+    let mut stage = StageOptions { effects, ..looking_down() };
+    stage.camera_changes.aperture = Some(0.05);
+    render_scene(&zoo(), &stage, options)
 }
 
 const INTEGRATORS: [IntegratorChoice; 2] = [IntegratorChoice::Path, IntegratorChoice::Whitted];
@@ -148,10 +157,10 @@ fn an_effect_that_is_not_simulated_has_no_rays_no_samples_and_no_look_ups() {
         let add = EffectSet::AMBIENT_OCCLUSION;
         let all = zoo_with(EffectOverrides { add, ..EffectOverrides::default() }, &options(cut()));
         for entry in &all.effects.entries {
-            // Each integrator has one effect that is not its own; even light is for rooms, of which this is none.
+            // Each integrator has effects that are not its own; even light is for rooms, of which this is none.
             let idle = match integrator {
                 IntegratorChoice::Path => EffectSet::AMBIENT_OCCLUSION,
-                _ => EffectSet::INDIRECT_LIGHT | EffectSet::AMBIENT_OCCLUSION,
+                _ => EffectSet::INDIRECT_LIGHT | EffectSet::FOG | EffectSet::AMBIENT_OCCLUSION,
             };
             let works = work(&all, entry.effect) > 0;
             assert_eq!(works, !idle.contains(entry.effect), "{} by {integrator:?}", entry.name);
