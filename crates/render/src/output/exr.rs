@@ -57,7 +57,8 @@ pub(super) fn write(out: &mut impl Write, film: &Film, layers: Layers) -> io::Re
     let layer = Layer::new(
         (window.width as usize, window.height as usize),
         attributes,
-        Encoding::SMALL_FAST_LOSSLESS,
+        // Blocks are compressed on all threads; in any other order than theirs, files of one picture would differ.
+        Encoding { line_order: LineOrder::Increasing, ..Encoding::SMALL_FAST_LOSSLESS },
         AnyChannels::sort(channels),
     );
     let mut image = Image::from_layer(layer);

@@ -168,3 +168,25 @@ fn a_place_is_tried_without_a_trace() {
     assert!(try_path(&folder.path().join("no/such/folder/a.png")).is_err());
     assert!(try_path(folder.path()).is_err());
 }
+
+/// Blocks are compressed on several threads, and must lie in the file in one order.
+#[test]
+fn one_picture_is_one_file() {
+    let mut film = Film::new(256, 256, None, &[Aov::Depth]).unwrap();
+    for mut band in film.bands_mut(16) {
+        for y in band.rows() {
+            for x in band.columns() {
+                // Some blocks are much harder to compress than others.
+                let v = (x * y * (y / 32)) as f32;
+                band.pixel(x, y)[0].add([v.sin(), v.cos(), v, 1.0]);
+            }
+        }
+    }
+    let file = || {
+        let mut bytes = Vec::new();
+        exr::write(&mut bytes, &film, exr::Layers::All).unwrap();
+        bytes
+    };
+    let first = file();
+    assert!((0..16).all(|_| file() == first));
+}
