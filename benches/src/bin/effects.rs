@@ -59,6 +59,15 @@ fn main() -> ExitCode {
     }
 }
 
+/// Instructions of a sample: what more samples take more, so that what is done once does not count.
+fn of_a_sample(model: &Path, by: By, width: u32) -> Result<Option<f64>, String> {
+    const FEW: u32 = 2;
+    const MANY: u32 = 10;
+    let [few, many] = [FEW, MANY].map(|spp| instructions(model, by, Work { width, spp }));
+    let samples = f64::from(width * (width * 3 / 4).max(1) * (MANY - FEW));
+    Ok(few?.zip(many?).map(|(few, many)| (many as f64 - few as f64) / samples))
+}
+
 fn start(args: Args) -> Result<(), String> {
     let work = Work { width: args.width, spp: args.spp };
     let assets = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../assets"));
@@ -74,13 +83,12 @@ fn start(args: Args) -> Result<(), String> {
         let mut row = measure(model, work, args.reps.into())?;
         eprintln!("{}: {}, full / chosen {:.3}", row.scene, row.kernel, row.time);
         if args.instructions {
-            // Under valgrind a tenth of the pixels is enough: the numbers hardly change.
-            let work = Work { width: work.width.div_ceil(3), spp: work.spp.min(4) };
-            let counts = [instructions(model, By::Chosen, work)?, instructions(model, By::Full, work)?];
-            if let [Some(chosen), Some(full)] = counts.map(|c| c.map(|n| n as f64)) {
-                let samples = work.width * (work.width * 3 / 4) * work.spp;
+            // Under valgrind a few pixels are enough: the numbers hardly change.
+            let width = work.width.div_ceil(3);
+            let counts = [of_a_sample(model, By::Chosen, width)?, of_a_sample(model, By::Full, width)?];
+            if let [Some(chosen), Some(full)] = counts {
                 row.instructions = Some(full / chosen);
-                row.instructions_per_sample = Some(chosen / f64::from(samples));
+                row.instructions_per_sample = Some(chosen);
                 eprintln!("{}: instructions, full / chosen {:.3}", row.scene, full / chosen);
             }
         }
