@@ -213,9 +213,9 @@ fn root_mean_square(a: &Film, b: Option<&Film>) -> f64 {
     let (a, b) = (a.color(), b.map(Film::color));
     let mut sum = 0.0;
     for (i, p) in a.pixels.iter().enumerate() {
-        for c in 0..3 {
-            let other = b.as_ref().map_or(0.0, |b| b.pixels[i][c]);
-            let d = f64::from(p[c]) - f64::from(other);
+        let other = b.as_ref().map_or([0.0; 4], |b| b.pixels[i]);
+        for (x, y) in p.iter().zip(other).take(3) {
+            let d = f64::from(*x) - f64::from(y);
             sum += d * d;
         }
     }

@@ -17,8 +17,10 @@ use glam::{DAffine3, DVec3, Vec3, Vec4};
 use crate::common::{accel, mapped_quad, quad, render_scene, scene_of, stage};
 use crate::{assert_near, bits, diffuse, light, pbr, small, surrounded};
 
+type Change = fn(&mut PbrMaterial);
+
 /// A material for each effect of materials.
-const SPECIMENS: [(EffectSet, fn(&mut PbrMaterial)); 15] = [
+const SPECIMENS: [(EffectSet, Change); 15] = [
     (EffectSet::REFLECTION, |m| (m.metallic, m.roughness) = (1.0, 0.1)),
     (EffectSet::REFRACTION, |m| (m.transmission, m.thickness, m.roughness) = (1.0, 1.0, 0.0)),
     (EffectSet::TRANSMISSION, |m| (m.transmission, m.roughness) = (1.0, 0.0)),
