@@ -84,7 +84,8 @@ fn the_level_of_instructions_is_forced_from_outside() {
         assert!(table.contains("robust wide8 scalar"), "not the usual level: it is named: {table}");
     }
     let render = ["render", "octa.obj", "-s1", "--resolution=8x8", "-o", "octa.png"];
-    for args in [&bench[..], &render, &["inspect", "octa.obj"], &["accuracy", "octa.obj", "--quick"]] {
+    let renders = ["bench", "--render", "octa.obj", "--spp", "1", "--resolution=8x8"];
+    for args in [&bench[..], &render, &renders, &["inspect", "octa.obj"], &["accuracy", "octa.obj", "--quick"]] {
         let output = run(args, "mmx");
         assert_eq!(output.status.code(), Some(2), "{args:?}");
         assert!(stderr(&output).contains("FIRSTHIT_SIMD: unknown SIMD level 'mmx'"), "{}", stderr(&output));

@@ -115,6 +115,8 @@ impl Forward {
                 return done;
             }
             let follow = |task: u64| {
+                // What this thread counted before belongs to other work.
+                let _ = Tally::take();
                 let mut tracer = Tracer::<K>::new(stage, clip);
                 let mut found: Vec<Contribution> = Vec::new();
                 let mut light = LightPaths::default();

@@ -623,6 +623,7 @@ impl<'a> Job<'a> {
         for ((shot, ray), hit) in shots.list.iter().zip(&shots.rays).zip(&shots.hits) {
             tracer.timed = shot.timed;
             tracer.clock = shot.begun.map(|_| clock);
+            let started = shot.begun.map(|begun| (begun + each, Instant::now()));
             let mut hit = *hit;
             if moves {
                 tally::sample(EffectSet::MOTION);
@@ -630,7 +631,6 @@ impl<'a> Job<'a> {
                 hit = if paths { tracer.closest(crate::RayKind::Camera, ray, None) } else { None };
             }
             let (x, y) = shot.pixel;
-            let started = shot.begun.map(|begun| (begun + each, Instant::now()));
             bad += u64::from(!self.sample(tracer, band.pixel(x, y), shot, *ray, hit, splats));
             if let Some((before, started)) = started {
                 tracer.timing.parts.whole.note(before + started.elapsed());
@@ -658,7 +658,7 @@ impl<'a> Job<'a> {
             Method::Values(..) => tracer.values(ray, self.cone),
         };
         let heat = self.aovs.contains(&Aov::Heat) || matches!(self.method, Method::Values(Aov::Heat, _));
-        let cost = if heat { self.stage.accel.closest_hit_counted(&ray).1 } else { TraversalCounts::default() };
+        let cost = if heat { tracer.stage.accel.closest_hit_counted(&ray).1 } else { TraversalCounts::default() };
         if let (Method::Values(aov, far), Some(first)) = (self.method, &seen.first) {
             seen.color = first.shown(aov, cost, far);
         }

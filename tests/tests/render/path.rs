@@ -3,12 +3,14 @@
 use std::f64::consts::PI;
 use std::time::Duration;
 
+use firsthit_accel::{BuildOptions, SceneBuilder};
+use firsthit_geometry::Precision;
 use firsthit_import::SceneDesc;
 use firsthit_import::scene::{AlphaMode, LightKind, MaterialModel};
 use firsthit_render::sampler::SamplerChoice;
 use firsthit_render::{
-    Aov, Checkpoint, Crop, EffectOverrides, EffectSet, IntegratorChoice, Monitor, RayKind, RenderOptions, StageOptions,
-    render, render_from,
+    Aov, Checkpoint, Crop, EffectOverrides, EffectSet, IntegratorChoice, Monitor, RayKind, RenderOptions, Stage,
+    StageOptions, render, render_from,
 };
 use glam::{DVec3, Vec3, Vec4};
 
@@ -433,25 +435,29 @@ fn a_checkpoint_loses_no_more_than_the_rows_at_hand() {
         }
     }
     let scene = std::sync::Arc::new(everything());
-    let stage = common::stage(&scene, &StageOptions::default());
-    let options = small(40);
-    let plain = render(&stage, &options, &()).unwrap();
-    let eager = Eager::default();
-    let watched = render(&stage, &options, &eager).unwrap();
-    assert_eq!(watched.film, plain.film);
-    assert_eq!(watched.stats.rays, plain.stats.rays);
-    assert_eq!(watched.stats.samples, plain.stats.samples);
-    let (counts, kept) = eager.0.into_inner().unwrap();
-    let mut before = 0;
-    for count in &counts {
-        // One row of each of the eight bands, 16 samples a pixel.
-        assert!(count - before <= 8 * 48 * 16, "{before} to {count}");
-        before = *count;
-    }
-    assert_eq!(before, plain.stats.samples);
-    assert!(kept.len() >= 2);
-    for bytes in kept {
-        let (start, _) = Checkpoint::read(&mut bytes.as_slice()).unwrap();
-        assert_eq!(render_from(&stage, &options, Some(start), &()).unwrap().film, plain.film);
+    for precision in [Precision::Robust, Precision::Fast] {
+        let build = BuildOptions { precision, ..BuildOptions::default() };
+        let accel = SceneBuilder::from_desc(&scene, build).build().unwrap();
+        let stage = Stage::new(scene.clone(), accel, &StageOptions::default()).unwrap();
+        let options = small(40);
+        let plain = render(&stage, &options, &()).unwrap();
+        let eager = Eager::default();
+        let watched = render(&stage, &options, &eager).unwrap();
+        assert_eq!(watched.film, plain.film);
+        assert_eq!(watched.stats.rays, plain.stats.rays);
+        assert_eq!(watched.stats.samples, plain.stats.samples);
+        let (counts, kept) = eager.0.into_inner().unwrap();
+        let mut before = 0;
+        for count in &counts {
+            // One row of each of the eight bands, 16 samples a pixel.
+            assert!(count - before <= 8 * 48 * 16, "{before} to {count}");
+            before = *count;
+        }
+        assert_eq!(before, plain.stats.samples);
+        assert!(kept.len() >= 2);
+        for bytes in kept {
+            let (start, _) = Checkpoint::read(&mut bytes.as_slice()).unwrap();
+            assert_eq!(render_from(&stage, &options, Some(start), &()).unwrap().film, plain.film);
+        }
     }
 }

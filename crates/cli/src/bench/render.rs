@@ -15,6 +15,7 @@ use crate::error::{Exit, Failure};
 use crate::interrupt::Interrupt;
 use crate::measured;
 use crate::progress::{Progress, Style};
+use crate::simd;
 
 /// Renders the scenes of the arguments.
 pub(super) fn run(args: &BenchArgs, console: Console) -> Result<Exit, Failure> {
@@ -25,6 +26,7 @@ pub(super) fn run(args: &BenchArgs, console: Console) -> Result<Exit, Failure> {
         threads: args.threads.map_or(usual.threads, |n| vec![n.into()]),
         size: args.resolution.map_or(usual.size, |r| (r.width, r.height)),
         seed: args.seed.unwrap_or(usual.seed),
+        simd: simd::level()?,
     };
     let interrupt = Interrupt::listen(console, "printing what was measured so far");
     let mut subjects = Vec::new();
@@ -58,14 +60,14 @@ fn subject(path: &Path, args: &BenchArgs, console: Console) -> Result<RenderSubj
     Ok(RenderSubject::read(&name(path, &args.models), &file, scene)?)
 }
 
-/// Scenes that are all called `scene.json` go by their folders.
+/// Scenes that are called `scene.json` go by their folders; those that would be called the same, by their paths.
 fn name(path: &Path, all: &[PathBuf]) -> String {
-    if path.file_name().is_some_and(|n| n == "scene.json")
-        && let Some(folder) = path.parent().and_then(Path::file_name)
-    {
-        return folder.to_string_lossy().into_owned();
-    }
-    measured::name(path, all)
+    let folders: Vec<PathBuf> = all.iter().map(|p| folder(p).to_owned()).collect();
+    measured::name(folder(path), &folders)
+}
+
+fn folder(path: &Path) -> &Path {
+    path.parent().filter(|f| path.ends_with("scene.json") && f.file_name().is_some()).unwrap_or(path)
 }
 
 /// Everything that was measured, as tables for a terminal.

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use firsthit_accel::{BuildOptions, SceneBuilder};
+use firsthit_accel::{BuildOptions, Level, SceneBuilder};
 use firsthit_import::scene::Settings;
 use firsthit_import::{ImportError, SceneDesc};
 use firsthit_render::film::Picture;
@@ -55,13 +55,15 @@ pub struct RenderBenchOptions {
     pub size: (u32, u32),
     /// Of all samples.
     pub seed: u64,
+    /// The instructions that rays are traced by.
+    pub simd: Level,
 }
 
 impl Default for RenderBenchOptions {
     fn default() -> Self {
         let all = std::thread::available_parallelism().map_or(1, Into::into);
         let threads = if all > 1 { vec![1, all] } else { vec![1] };
-        Self { spp: vec![4, 16, 64, 256], threads, size: (640, 360), seed: 0 }
+        Self { spp: vec![4, 16, 64, 256], threads, size: (640, 360), seed: 0, simd: Level::default() }
     }
 }
 
@@ -238,8 +240,9 @@ impl Run<'_> {
             let pool = ThreadPoolBuilder::new().num_threads(threads.max(1)).build();
             let pool = pool.map_err(|e| MeasureError::Threads(e.to_string()))?;
             if stage.is_none() {
+                let build = BuildOptions { simd: self.options.simd, ..BuildOptions::default() };
                 let made = pool.install(|| -> Result<Stage, PictureError> {
-                    let accel = SceneBuilder::from_desc(&subject.scene, BuildOptions::default()).build()?;
+                    let accel = SceneBuilder::from_desc(&subject.scene, build).build()?;
                     Ok(Stage::new(subject.scene.clone(), accel, &stage_options)?)
                 });
                 stage = Some(made.map_err(failed)?);
@@ -329,7 +332,7 @@ mod tests {
     }
 
     fn quick() -> RenderBenchOptions {
-        RenderBenchOptions { spp: vec![4, 16], threads: vec![1, 2], size: SIZE, seed: 3 }
+        RenderBenchOptions { spp: vec![4, 16], threads: vec![1, 2], size: SIZE, seed: 3, simd: Level::default() }
     }
 
     fn flat(value: f32) -> Picture {

@@ -4,8 +4,8 @@ use std::marker::PhantomData;
 use std::time::{Duration, Instant};
 
 use firsthit_accel::{Hit, HitId};
-use firsthit_geometry::Ray;
 use firsthit_geometry::clip::ClipRegion;
+use firsthit_geometry::{Precision, Ray};
 use glam::{DVec3, Vec3};
 
 use super::clock::{Clock, Parts, Spent};
@@ -21,6 +21,8 @@ use crate::{EffectSet, RayCounts, RayKind, Stage, tally};
 pub(crate) struct Timing {
     seconds: [f64; RayKind::ALL.len()],
     rays: [u64; RayKind::ALL.len()],
+    /// How often the clock was looked at for them.
+    looks: u64,
     pub(crate) parts: Parts,
 }
 
@@ -30,6 +32,7 @@ impl Timing {
             self.seconds[k] += other.seconds[k];
             self.rays[k] += other.rays[k];
         }
+        self.looks += other.looks;
         self.parts.add(&other.parts);
     }
 
@@ -40,7 +43,7 @@ impl Timing {
 
     /// Rays of all kinds.
     pub(crate) fn traversal(&self) -> Spent {
-        Spent { seconds: self.seconds.iter().sum(), spans: self.rays.iter().sum() }
+        Spent { seconds: self.seconds.iter().sum(), spans: self.looks }
     }
 
     fn note(&mut self, kind: RayKind, time: Duration) {
@@ -51,6 +54,7 @@ impl Timing {
     fn note_some(&mut self, kind: RayKind, each: Duration, rays: u64) {
         self.seconds[kind as usize] += each.as_secs_f64() * rays as f64;
         self.rays[kind as usize] += rays;
+        self.looks += u64::from(rays > 0);
     }
 }
 
@@ -199,7 +203,15 @@ impl<'a, K: Kernel> Tracer<'a, K> {
                 &inside
             }
         };
-        self.stage.accel.closest_hits(rays, hits);
+        // `Fast` alone may find other hits in a packet than one by one, and what goes in one packet depends on where a
+        // render pauses.
+        if self.stage.accel.options().precision == Precision::Fast {
+            for (ray, hit) in rays.iter().zip(&mut *hits) {
+                *hit = self.stage.accel.closest_hit(ray);
+            }
+        } else {
+            self.stage.accel.closest_hits(rays, hits);
+        }
         if K::FILTERED {
             for (ray, hit) in rays.iter().zip(hits) {
                 *hit = self.seen(ray, None, *hit);

@@ -167,8 +167,9 @@ impl Environment {
         match &self.source {
             Source::Constant => None,
             Source::Map(map) => {
+                let bright = map.bright()?;
                 tally::sample(EffectSet::ENVIRONMENT);
-                Some(self.sample_map(map, map.bright()?, u))
+                Some(self.sample_map(map, bright, u))
             }
         }
     }
@@ -180,6 +181,7 @@ impl Environment {
         match &self.source {
             Source::Constant => (self.scale, 0.0),
             Source::Map(map) => {
+                tally::look_up(EffectSet::ENVIRONMENT);
                 let uv = self.to_map(direction);
                 (self.scale * map.bilinear(uv), map.pdf(map.bright(), uv))
             }
