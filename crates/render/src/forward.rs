@@ -15,7 +15,7 @@ use crate::light::emitters::{Emitters, Endless};
 use crate::sampler::{Dimension, PixelSampler};
 use crate::splat::{Contribution, Reach, Splats};
 use crate::tally::Tally;
-use crate::{Crop, LightPaths, Monitor, RayCounts, RenderOptions, Stage};
+use crate::{Crop, LightPaths, RayCounts, RenderOptions, Stage};
 
 /// Paths that one thread follows at a time.
 const TASK: u64 = 256;
@@ -43,6 +43,8 @@ pub(crate) struct Done {
     pub(crate) timing: Timing,
     pub(crate) light: LightPaths,
     pub(crate) tally: Tally,
+    /// Whether paths were left out: the splats are then of no use.
+    pub(crate) stopped: bool,
 }
 
 impl Done {
@@ -51,6 +53,7 @@ impl Done {
         self.timing.add(&other.timing);
         self.light += other.light;
         self.tally += other.tally;
+        self.stopped |= other.stopped;
         self
     }
 }
@@ -89,8 +92,8 @@ impl Forward {
         })
     }
 
-    /// Follows the light paths of one sample; what they bring is then in the splats. A cancelled render keeps nothing
-    /// of it.
+    /// Follows the light paths of one sample; what they bring is then in the splats. Between batches of paths it asks
+    /// whether to go on.
     pub(crate) fn sample<K: Kernel>(
         &mut self,
         stage: &Stage,
@@ -100,7 +103,7 @@ impl Forward {
         (camera, cone): (&FilmCamera, Cone),
         filter: &Filter,
         clip: &ClipRegion<f64>,
-        monitor: &dyn Monitor,
+        goes_on: &dyn Fn() -> bool,
     ) -> Done {
         self.splats.clear();
         if self.emitters.is_empty() {
@@ -111,7 +114,8 @@ impl Forward {
         let tasks = self.paths.div_ceil(TASK);
         let mut done = Done::default();
         for first in (0..tasks).step_by(at_once as usize) {
-            if monitor.cancelled() {
+            if first > 0 && !goes_on() {
+                done.stopped = true;
                 return done;
             }
             let follow = |task: u64| {
@@ -132,7 +136,8 @@ impl Forward {
                     let scene = Scene { emitters, camera, cone, reach: self.reach, limits };
                     light += tracer.light_path(&scene, sampler, &mut found);
                 }
-                (found, Done { rays: tracer.counts, timing: tracer.timing, light, tally: Tally::take() })
+                let (rays, timing) = (tracer.counts, tracer.timing);
+                (found, Done { rays, timing, light, tally: Tally::take(), stopped: false })
             };
             let (lists, counts): (Vec<_>, Vec<_>) =
                 (first..(first + at_once).min(tasks)).into_par_iter().map(follow).unzip();

@@ -12,7 +12,7 @@ pub trait Monitor: Sync {
     }
 
     /// Whether [`Monitor::checkpoint`] is to be called now: it is, once each thread has finished the row of pixels that it is
-    /// at. Asked before each row.
+    /// at. Asked before each row, and between batches of light paths: those of the sample at hand are not in the sums.
     fn wants_checkpoint(&self) -> bool {
         false
     }

@@ -441,6 +441,17 @@ impl<'a> Job<'a> {
                 last = first + 1;
                 let of_camera = (&self.camera, self.cone);
                 let limits = self.limits();
+                // Until the light paths are all followed, nothing of this sample is in the film.
+                let sums = Sums { film, rest };
+                let goes_on = || {
+                    if monitor.cancelled() || self.is_late(first) {
+                        return false;
+                    }
+                    if monitor.wants_checkpoint() {
+                        monitor.checkpoint(&sums);
+                    }
+                    true
+                };
                 let paths = forward.sample::<K>(
                     self.stage,
                     self.options,
@@ -449,7 +460,7 @@ impl<'a> Job<'a> {
                     of_camera,
                     &self.filter,
                     &self.clip,
-                    monitor,
+                    &goes_on,
                 );
                 done = done.and(Done {
                     rays: paths.rays,
@@ -460,6 +471,9 @@ impl<'a> Job<'a> {
                 });
                 if monitor.cancelled() {
                     return (done, End::Cancelled);
+                }
+                if paths.stopped {
+                    return (done, End::OutOfTime);
                 }
             }
             let splats = forward.as_deref().map(Forward::splats);

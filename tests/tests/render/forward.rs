@@ -1,7 +1,8 @@
 //! Light tracing against path tracing: other ways of asking, the same light.
 
 use std::sync::Arc;
-use std::time::Instant;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use firsthit_import::SceneDesc;
 use firsthit_import::scene::{
@@ -375,6 +376,59 @@ fn light_tracing_can_be_put_aside_and_made_in_shares() {
     let (aside, _) = Checkpoint::read(&mut bytes.as_slice()).unwrap();
     let resumed = render_from(&stage, &by_light(40), Some(aside), &()).unwrap();
     assert_eq!(bits(&whole), bits(&resumed));
+}
+
+/// Light paths of one sample may be many: between them too time can be up, and a checkpoint be made.
+#[test]
+fn light_paths_are_left_when_time_is_up() {
+    const LIMIT: Duration = Duration::from_secs(2);
+
+    /// Wants a checkpoint after the first sample, and one more, which takes until time is up.
+    #[derive(Default)]
+    struct Slow {
+        begun: AtomicBool,
+        kept: std::sync::Mutex<Vec<Vec<u8>>>,
+    }
+    impl Monitor for Slow {
+        fn progress(&self, _: u64, _: u64, _: u64) {
+            self.begun.store(true, Ordering::Relaxed);
+        }
+        fn wants_checkpoint(&self) -> bool {
+            self.begun.load(Ordering::Relaxed) && self.kept.lock().unwrap().len() < 2
+        }
+        fn checkpoint(&self, sums: &firsthit_render::Sums<'_>) {
+            assert_eq!(sums.film().samples_per_pixel(), 1.0);
+            let mut bytes = Vec::new();
+            sums.write(&mut bytes, "light").unwrap();
+            let mut kept = self.kept.lock().unwrap();
+            kept.push(bytes);
+            if kept.len() == 2 {
+                std::thread::sleep(LIMIT);
+            }
+        }
+    }
+    let stage = common::stage(&Arc::new(everything()), &StageOptions::default());
+    // Of a large picture a few pixels: there is little to do but to follow light, in four batches for each sample.
+    let (width, height, crop) = (64, 64, Some(Crop { x: 20, y: 30, width: 8, height: 4 }));
+    let of = |spp| RenderOptions { width, height, crop, max_depth: 1024, ..by_light(spp) };
+    let slow = Slow::default();
+    let late = render(&stage, &RenderOptions { time_limit: Some(LIMIT), ..of(9) }, &slow).unwrap();
+    assert!(late.out_of_time && !late.interrupted);
+    let paths = late.stats.light.paths;
+    assert!(paths > 64 * 64 && paths < 2 * 64 * 64, "{paths} paths");
+    // Nothing of the second sample is kept.
+    assert_eq!(bits(&late), bits(&render(&stage, &of(1), &()).unwrap()));
+    let whole = bits(&render(&stage, &of(3), &()).unwrap());
+    let kept = slow.kept.into_inner().unwrap();
+    assert_eq!(kept.len(), 2);
+    for bytes in kept {
+        let (aside, _) = Checkpoint::read(&mut bytes.as_slice()).unwrap();
+        assert_eq!(bits(&render_from(&stage, &of(3), Some(aside), &()).unwrap()), whole);
+    }
+    // Every pixel gets its first sample, whatever the limit.
+    let hasty = render(&stage, &RenderOptions { time_limit: Some(Duration::ZERO), ..of(9) }, &()).unwrap();
+    assert!(hasty.out_of_time && hasty.stats.light.paths == 64 * 64);
+    assert_eq!(bits(&hasty), bits(&late));
 }
 
 /// What no light path brings is not simulated, and what the others do costs nothing.
