@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::render::render;
+use crate::render::{planned, render};
 use crate::{
     EffectOverrides, EffectSet, Film, IntegratorChoice, Monitor, RenderError, RenderOptions, Stage, StageError,
     StageOptions,
@@ -15,7 +15,7 @@ pub struct AblateOptions {
     pub width: u32,
     /// Samples of a pixel.
     pub spp: u32,
-    /// How often each picture is timed; the median counts. At least 1.
+    /// How often each picture without an effect is timed, and the whole one beside it; the median counts. At least 1.
     pub repetitions: u32,
 }
 
@@ -38,7 +38,7 @@ pub struct Ablation {
     pub relative: f64,
     /// Wall-clock seconds of the render without it: median.
     pub seconds: f64,
-    /// Seconds of the render with all effects less those without this one, each taken in the same round: median.
+    /// Seconds of the render with all effects less those without this one, each taken just before it: median.
     pub saved: f64,
     /// The picture without it.
     pub film: Film,
@@ -53,7 +53,7 @@ pub struct Ablations {
     pub height: u32,
     /// Samples of a pixel.
     pub spp: u32,
-    /// How often each picture was timed.
+    /// How often each picture without an effect was timed.
     pub repetitions: u32,
     /// Wall-clock seconds with all effects: median.
     pub seconds: f64,
@@ -84,8 +84,8 @@ pub enum AblateError {
 /// Renders a stage with all of its effects and without each, in turn, on the caller's rayon pool.
 ///
 /// `options` is the picture that is asked for: its camera's shape, depth, seed, integrator and section count; how fine it
-/// is, `how` says. `setup` is what the stage was made with. Each round renders all pictures once, so that what disturbs
-/// the machine disturbs all alike.
+/// is, `how` says. `setup` is what the stage was made with. Before each picture without an effect the whole one is rendered
+/// again, so that what disturbs the machine disturbs both alike.
 ///
 /// # Errors
 /// When a picture cannot be made, or the monitor cancels.
@@ -98,19 +98,15 @@ pub fn ablate<M: Monitor + ?Sized>(
 ) -> Result<Ablations, AblateError> {
     options.check()?;
     let options = small(options, how);
-    let mut ways = Vec::new();
-    for (effect, name) in EffectSet::NAMES {
-        if simulated(stage, &options).contains(effect) {
-            ways.push((effect, name, without(stage, setup, effect)?));
-        }
-    }
+    let simulated = removable(stage, &options);
+    let ways: Vec<_> = EffectSet::NAMES.into_iter().filter(|(effect, _)| simulated.contains(*effect)).collect();
     // Cutting is no matter of the stage.
     let cut = |effect| match effect {
         EffectSet::CLIPPING => RenderOptions { clip: crate::Clip::default(), ..options.clone() },
         _ => options.clone(),
     };
     let repetitions = how.repetitions.max(1);
-    let total = u64::from(repetitions) * (ways.len() as u64 + 1) + 1;
+    let total = 2 * u64::from(repetitions) * ways.len() as u64 + 2;
     let mut done = 0;
     let mut timed = |stage: &Stage, options: &RenderOptions| {
         if monitor.cancelled() {
@@ -128,38 +124,41 @@ pub fn ablate<M: Monitor + ?Sized>(
     let (_, other) = timed(stage, &RenderOptions { seed: options.seed.wrapping_add(1), ..options.clone() })?;
     let (first, film) = timed(stage, &options)?;
     let mut whole = vec![first];
-    let mut without: Vec<(Vec<f64>, Option<Film>)> = vec![(Vec::new(), None); ways.len()];
-    for round in 0..repetitions {
-        if round > 0 {
-            whole.push(timed(stage, &options)?.0);
-        }
-        for ((effect, _, stage), (seconds, film)) in ways.iter().zip(&mut without) {
-            let (s, f) = timed(stage, &cut(*effect))?;
-            seconds.push(s);
-            *film = Some(f);
-        }
-    }
     let size = root_mean_square(&film, None);
-    let effects = ways.iter().zip(without).filter_map(|((effect, name, _), (seconds, without))| {
-        let saved = whole.iter().zip(&seconds).map(|(with, without)| with - without).collect();
-        let without = without?;
+    let mut effects = Vec::new();
+    for (effect, name) in ways {
+        if monitor.cancelled() {
+            return Err(AblateError::Cancelled);
+        }
+        // One at a time: each has images and lights of its own.
+        let other = without(stage, setup, effect)?;
+        let (mut seconds, mut saved, mut last) = (Vec::new(), Vec::new(), None);
+        for _ in 0..repetitions {
+            let (with, _) = timed(stage, &options)?;
+            let (without, film) = timed(&other, &cut(effect))?;
+            whole.push(with);
+            seconds.push(without);
+            saved.push(with - without);
+            last = Some(film);
+        }
+        let Some(without) = last else { continue };
         let rmse = root_mean_square(&film, Some(&without));
-        Some(Ablation {
-            effect: *effect,
+        effects.push(Ablation {
+            effect,
             name,
             rmse,
             relative: rmse / size,
             seconds: median(seconds),
             saved: median(saved),
             film: without,
-        })
-    });
+        });
+    }
     Ok(Ablations {
         width: options.width,
         height: options.height,
         spp: options.spp,
         repetitions,
-        effects: effects.collect(),
+        effects,
         seconds: median(whole),
         noise: root_mean_square(&film, Some(&other)),
         film,
@@ -183,12 +182,11 @@ fn small(options: &RenderOptions, how: &AblateOptions) -> RenderOptions {
     }
 }
 
-/// What a render of the stage simulates.
-fn simulated(stage: &Stage, options: &RenderOptions) -> EffectSet {
-    let mut effects = stage.plan().simulated();
-    effects.set(EffectSet::CLIPPING, options.clip != crate::Clip::default());
-    if !matches!(options.integrator, IntegratorChoice::Auto | IntegratorChoice::Path) {
-        effects.remove(EffectSet::INDIRECT_LIGHT);
+/// What a render of the stage simulates, but for what it is a picture of.
+fn removable(stage: &Stage, options: &RenderOptions) -> EffectSet {
+    let mut effects = planned(stage, options).simulated();
+    if options.integrator == IntegratorChoice::AmbientOcclusion {
+        effects.remove(EffectSet::AMBIENT_OCCLUSION);
     }
     effects
 }

@@ -61,7 +61,7 @@ bitflags! {
         const MOTION = 1 << 19;
         /// Fog. Only path tracing simulates it.
         const FOG = 1 << 26;
-        /// Light that surfaces send to each other. Only path tracing simulates it.
+        /// Light that surfaces send to each other. Path tracing and light tracing simulate it.
         const INDIRECT_LIGHT = 1 << 17;
     }
 }

@@ -222,20 +222,7 @@ fn render_watched(
         KernelChoice::Full => Job::run::<Full>,
     };
     let (done, end) = run(&job, &mut film, &mut tiles, &mut rest, forward.as_mut(), monitor);
-    let mut plan = stage.plan().clone();
-    if !matches!(job.method, Method::Path(_) | Method::Forward(_)) {
-        plan.leave(EffectSet::INDIRECT_LIGHT);
-    }
-    if !matches!(job.method, Method::Path(_)) {
-        plan.leave(EffectSet::FOG);
-    }
-    if !job.clip.is_all() {
-        plan.ask(EffectSet::CLIPPING, "the section asked for");
-    }
-    if matches!(job.method, Method::Occlusion(_)) {
-        plan.ask(EffectSet::AMBIENT_OCCLUSION, "the integrator");
-    }
-    let effects = plan.with_costs(&done.rays, &done.tally, |kind| done.timing.seconds_per_ray(kind));
+    let effects = planned(stage, options).with_costs(&done.rays, &done.tally, |kind| done.timing.seconds_per_ray(kind));
     let stats = RenderStats {
         rays: done.rays,
         samples: done.samples,
@@ -247,6 +234,27 @@ fn render_watched(
     };
     let (interrupted, out_of_time) = (end == End::Cancelled, end == End::OutOfTime);
     Ok(Rendered { film, stats, effects, interrupted, out_of_time, rest })
+}
+
+/// The stage's plan as a render with these options follows it: not every integrator simulates all effects, and some are
+/// asked for here.
+pub(crate) fn planned(stage: &Stage, options: &RenderOptions) -> EffectPlan {
+    let mut plan = stage.plan().clone();
+    match options.integrator {
+        IntegratorChoice::Auto | IntegratorChoice::Path => {}
+        IntegratorChoice::Light => plan.leave(EffectSet::FOG),
+        IntegratorChoice::Whitted
+        | IntegratorChoice::Direct
+        | IntegratorChoice::AmbientOcclusion
+        | IntegratorChoice::Aov(_) => plan.leave(EffectSet::FOG | EffectSet::INDIRECT_LIGHT),
+    }
+    if !region(&options.clip).is_all() {
+        plan.ask(EffectSet::CLIPPING, "the section asked for");
+    }
+    if options.integrator == IntegratorChoice::AmbientOcclusion {
+        plan.ask(EffectSet::AMBIENT_OCCLUSION, "the integrator");
+    }
+    plan
 }
 
 /// A monitor of whatever kind.

@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use firsthit_import::SceneDesc;
 use firsthit_import::scene::{
@@ -9,8 +10,8 @@ use firsthit_import::scene::{
     MaterialModel, PbrMaterial, Pixels, Sheen, SurfaceDesc, TextureRef,
 };
 use firsthit_render::{
-    AblateOptions, Ablations, CameraChanges, Clip, EffectOverrides, EffectSet, FilterChoice, IntegratorChoice,
-    KernelChoice, RenderOptions, Rendered, StageOptions, ablate,
+    AblateError, AblateOptions, Ablations, CameraChanges, Clip, EffectOverrides, EffectSet, FilterChoice,
+    IntegratorChoice, KernelChoice, Monitor, RenderOptions, Rendered, StageOptions, ablate, render,
 };
 use glam::{DAffine3, DVec3, Vec3, Vec4};
 
@@ -325,4 +326,63 @@ fn without_what_is_not_seen_nothing_changes() {
     }
     let simulated = EffectSet::ENVIRONMENT | EffectSet::SHADOWS | EffectSet::INDIRECT_LIGHT | add;
     assert_eq!(ablations.effects.iter().map(|e| e.effect).collect::<EffectSet>(), simulated);
+}
+
+/// Watches ablations, and cancels after so many pictures.
+struct Patience {
+    pictures: u64,
+    seen: AtomicU64,
+    total: AtomicU64,
+}
+
+impl Patience {
+    fn for_pictures(pictures: u64) -> Self {
+        Self { pictures, seen: AtomicU64::new(0), total: AtomicU64::new(0) }
+    }
+}
+
+impl Monitor for Patience {
+    fn progress(&self, done: u64, total: u64, _: u64) {
+        self.seen.store(done, Ordering::Relaxed);
+        self.total.store(total, Ordering::Relaxed);
+    }
+
+    fn cancelled(&self) -> bool {
+        self.seen.load(Ordering::Relaxed) >= self.pictures
+    }
+}
+
+/// What a render says that it simulates is taken away, each in turn, and nothing else.
+#[test]
+fn ablations_take_away_what_the_plan_says_is_simulated() {
+    let (scene, setup) = (Arc::new(zoo()), looking_down());
+    let stage = stage(&scene, &setup);
+    let how = AblateOptions { width: 8, spp: 1, repetitions: 1 };
+    for integrator in [IntegratorChoice::Path, IntegratorChoice::Light, IntegratorChoice::Whitted] {
+        let options = RenderOptions { integrator, clip: cut(), ..small(1) };
+        let simulated = render(&stage, &options, &()).unwrap().effects.simulated();
+        assert_eq!(simulated.contains(EffectSet::FOG), integrator == IntegratorChoice::Path);
+        assert_eq!(simulated.contains(EffectSet::INDIRECT_LIGHT), integrator != IntegratorChoice::Whitted);
+        assert!(simulated.contains(EffectSet::CLIPPING));
+
+        let patience = Patience::for_pictures(u64::MAX);
+        let ablations = ablate(&stage, &setup, &options, &how, &patience).unwrap();
+        let taken: EffectSet = ablations.effects.iter().map(|e| e.effect).collect();
+        assert_eq!(taken, simulated, "{integrator:?}");
+        assert_eq!(patience.seen.into_inner(), patience.total.into_inner());
+    }
+}
+
+/// Ablations are cancelled between two pictures.
+#[test]
+fn ablations_can_be_cancelled() {
+    let (scene, setup) = floor(0.8, 1.5, false);
+    let stage = stage(&scene, &setup);
+    let how = AblateOptions { width: 8, spp: 1, repetitions: 2 };
+    for pictures in [0, 1, 4, 5] {
+        let patience = Patience::for_pictures(pictures);
+        let cancelled = ablate(&stage, &setup, &small(1), &how, &patience);
+        assert_eq!(cancelled.err(), Some(AblateError::Cancelled));
+        assert_eq!(patience.seen.into_inner(), pictures);
+    }
 }
