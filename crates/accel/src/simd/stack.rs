@@ -109,23 +109,42 @@ impl Top<'_, u64> {
         Top { entries, len }.pop().unwrap_or(0)
     }
 
-    /// One to four, sorted without a branch on how many.
+    /// One to four, sorted without a detour through memory.
     #[inline(always)]
     fn push_few(self, keys: [u64; 8], n: usize) -> u64 {
-        let len = *self.len;
-        assert!(len + 4 <= self.entries.len() && (1..=4).contains(&n), "trees are not so deep");
         let [a, b, c, d, ..] = keys;
-        // What is not there comes last.
-        let (b, c, d) = (if n > 1 { b } else { 0 }, if n > 2 { c } else { 0 }, if n > 3 { d } else { 0 });
-        let ((b, a), (d, c)) = (order(a, b), order(c, d));
-        let ((c, a), (d, b)) = (order(a, c), order(b, d));
-        let (c, b) = order(b, c);
-        for (slot, key) in self.entries[len..len + 4].iter_mut().zip([a, b, c, d]) {
+        match n {
+            2 => {
+                let (a, b) = order(a, b);
+                self.put([b]);
+                a
+            }
+            3 => {
+                let (a, b) = order(a, b);
+                let (b, c) = order(b, c);
+                let (a, b) = order(a, b);
+                self.put([c, b]);
+                a
+            }
+            4 => {
+                let ((a, b), (c, d)) = (order(a, b), order(c, d));
+                let ((a, c), (b, d)) = (order(a, c), order(b, d));
+                let (b, c) = order(b, c);
+                self.put([d, c, b]);
+                a
+            }
+            _ => a,
+        }
+    }
+
+    #[inline(always)]
+    fn put<const N: usize>(self, keys: [u64; N]) {
+        let len = *self.len;
+        assert!(len + N <= self.entries.len(), "trees are not so deep");
+        for (slot, key) in self.entries[len..len + N].iter_mut().zip(keys) {
             slot.write(key);
         }
-        *self.len = len + n - 1;
-        // SAFETY: `n` is one to four, and four entries were written just now.
-        unsafe { self.entries[len + n - 1].assume_init() }
+        *self.len = len + N;
     }
 
     /// Any number. Inlined too: a call would make the caller keep everything in memory.
