@@ -15,12 +15,12 @@ use crate::wide::Visit;
 
 /// Tests triangles for one ray, and offers what is hit.
 pub(crate) struct OfferTriangle<'a, const SURFACES: bool, K: Kernel> {
-    pub(crate) model: &'a Model,
-    pub(crate) ray: &'a LocalRay,
-    pub(crate) instance: u32,
+    model: &'a Model,
+    ray: &'a LocalRay,
+    instance: u32,
     pub(crate) setup: K::Setup,
     /// End of the interval in the instance's space.
-    pub(crate) limit: f64,
+    limit: f64,
 }
 
 impl<'a, const SURFACES: bool, K: Kernel> OfferTriangle<'a, SURFACES, K> {

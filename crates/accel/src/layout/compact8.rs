@@ -7,7 +7,7 @@
 use glam::Vec3;
 
 use super::wide8::{self, Reference, Wide8};
-use crate::simd::{Lanes, prefetch};
+use crate::simd::Lanes;
 use crate::wide::{Axis, BoxNode, Leaf, WideTree};
 
 /// Different vertices in a leaf at most: what two registers hold.
@@ -204,18 +204,6 @@ impl WideTree for Compact8 {
         let at = |k: usize, axis: usize| f32::from_bits(tables[axis * n + triangle.vertex(k)]);
         let corner = |k: usize| Vec3::new(at(k, 0), at(k, 1), at(k, 2));
         [corner(0), corner(1), corner(2)]
-    }
-
-    #[inline(always)]
-    fn prefetch(&self, at: Reference) {
-        if at.is_leaf() {
-            let place = (at.0 & (PLACES - 1)) as usize;
-            if let Some(words) = self.words[place..].first_chunk::<REACH>() {
-                prefetch(words);
-            }
-        } else {
-            prefetch(&self.nodes[at.index()]);
-        }
     }
 }
 

@@ -214,6 +214,17 @@ impl Wide8 {
     pub(crate) fn triangle(&self, place: usize) -> Option<[Vec3; 3]> {
         self.blocks.get(place / 4).map(|b| b.triangle(place % 4))
     }
+
+    /// Asks for the node or leaf, which will be looked at soon.
+    #[inline(always)]
+    pub(crate) fn prefetch(&self, at: Reference) {
+        if at.is_leaf() {
+            prefetch(&self.blocks[at.block()]);
+            prefetch(&self.blocks[at.block() + usize::from(at.lanes() > 0xf)]);
+        } else {
+            prefetch(&self.nodes[at.index()]);
+        }
+    }
 }
 
 impl WideTree for Wide8 {
@@ -241,16 +252,6 @@ impl WideTree for Wide8 {
     #[inline(always)]
     fn triangle(&self, place: usize) -> [Vec3; 3] {
         self.blocks[place / 4].triangle(place)
-    }
-
-    #[inline(always)]
-    fn prefetch(&self, at: Reference) {
-        if at.is_leaf() {
-            prefetch(&self.blocks[at.block()]);
-            prefetch(&self.blocks[at.block() + usize::from(at.lanes() > 0xf)]);
-        } else {
-            prefetch(&self.nodes[at.index()]);
-        }
     }
 }
 

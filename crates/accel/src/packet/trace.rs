@@ -241,21 +241,10 @@ impl Group {
         let t = if grazing && T::PADDED { within_triangle(ray, t, *triangle) } else { Some(t) };
         // -0 becomes 0, as in a `Candidate`.
         let Some(t) = t.map(|t| t * ray.t_unscale + 0.0) else { return false };
-        let (bit, t_max) = (1 << lane, self.t_max[lane]);
-        if !(self.t_min[lane] <= t && t <= t_max && t.is_finite()) || !among.model.has(place) {
+        if !(self.t_min[lane] <= t && t <= self.t_max[lane] && t.is_finite()) || !among.model.has(place) {
             return false;
         }
-        if !ANY {
-            if t == t_max && self.hit & bit != 0 && !comes_first(among.model, place, self.place(lane)) {
-                return false;
-            }
-            (self.t_max[lane], self.u[lane], self.v[lane]) = (t, u, v);
-            self.place[lane] = f32::from_bits(place as u32);
-            (self.normal[0][lane], self.normal[1][lane], self.normal[2][lane]) = (normal.x, normal.y, normal.z);
-            self.end[lane] = self.box_t_of(lane);
-        }
-        self.hit |= bit;
-        true
+        self.take_one::<ANY>(among.model, lane, place, (t, u, v), normal)
     }
 
     /// [`Group::offer`] of what only the kernel can decide.
@@ -269,24 +258,37 @@ impl Group {
         triangle: &[Vec3; 3],
         known: [f32; 3],
     ) -> bool {
-        let bit = 1 << lane;
         let ray = &among.rays[index][lane];
         let ray = ray.with_interval(ray.t_min, self.t_max[lane]);
         let Some(hit) = among.model.hit_of_one::<T>(&ray, among.transform, place, triangle, known) else {
             return false;
         };
+        self.take_one::<ANY>(among.model, lane, place, (hit.t, hit.u, hit.v), hit.normal)
+    }
+
+    /// Takes a hit of one ray within its interval, but for one that another at the same distance comes before; whether
+    /// it did.
+    #[inline(always)]
+    fn take_one<const ANY: bool>(
+        &mut self,
+        model: &Model,
+        lane: usize,
+        place: usize,
+        (t, u, v): (f64, f32, f32),
+        normal: DVec3,
+    ) -> bool {
+        let bit = 1 << lane;
         if ANY {
             self.end[lane] = f32::NEG_INFINITY;
             self.awake &= !bit;
         } else {
-            let tie = hit.t == self.t_max[lane] && self.hit & bit != 0;
-            if tie && !comes_first(among.model, place, self.place(lane)) {
+            let tie = t == self.t_max[lane] && self.hit & bit != 0;
+            if tie && !comes_first(model, place, self.place(lane)) {
                 return false;
             }
-            (self.t_max[lane], self.u[lane], self.v[lane]) = (hit.t, hit.u, hit.v);
+            (self.t_max[lane], self.u[lane], self.v[lane]) = (t, u, v);
             self.place[lane] = f32::from_bits(place as u32);
-            let DVec3 { x, y, z } = hit.normal;
-            (self.normal[0][lane], self.normal[1][lane], self.normal[2][lane]) = (x, y, z);
+            (self.normal[0][lane], self.normal[1][lane], self.normal[2][lane]) = (normal.x, normal.y, normal.z);
             self.end[lane] = self.box_t_of(lane);
         }
         self.hit |= bit;

@@ -21,8 +21,6 @@ pub(crate) trait WideTree {
     fn leaf(&self, at: Reference) -> Self::Leaf<'_>;
     /// The triangle at a place of a leaf.
     fn triangle(&self, place: usize) -> [Vec3; 3];
-    /// Asks for the node or leaf, which will be looked at soon.
-    fn prefetch(&self, at: Reference);
 }
 
 /// Eight boxes.
