@@ -429,6 +429,18 @@ impl FilmCamera {
         Some(Projected { at: [0.5 * (x + 1.0) * self.size[0], 0.5 * (1.0 - y) * self.size[1]], eye, pixels_per_area })
     }
 
+    /// Where in the picture a point of the world is, as [`FilmCamera::ray`] counts, seen through the middle of the lens;
+    /// `None` of what is not in front of the camera.
+    #[inline]
+    pub(crate) fn place(&self, point: DVec3) -> Option<[f64; 2]> {
+        let from = point - self.position;
+        let depth = from.dot(self.forward);
+        let scale = if self.perspective { depth } else { 1.0 };
+        let x = from.dot(self.right) / (scale * self.right.length_squared());
+        let y = from.dot(self.up) / (scale * self.up.length_squared());
+        (depth > 0.0).then(|| [0.5 * (x + 1.0) * self.size[0], 0.5 * (1.0 - y) * self.size[1]])
+    }
+
     /// How wide a pixel's view is (in the middle of the picture).
     #[inline]
     #[must_use]

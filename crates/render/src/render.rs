@@ -5,12 +5,13 @@ use std::time::{Duration, Instant};
 
 use firsthit_accel::{Hit, TraversalCounts};
 use firsthit_geometry::clip::{ClipRegion, HalfSpace};
-use firsthit_geometry::{Aabb, Ray};
+use firsthit_geometry::{Aabb, Precision, Ray};
 use glam::Vec3;
 use rayon::iter::{IndexedParallelIterator, ParallelIterator};
 
 use crate::camera::{Cone, FilmCamera};
 use crate::checkpoint::Rest;
+use crate::empty::Empty;
 use crate::film::{Accumulator, Band};
 use crate::filter::Filter;
 use crate::forward::{Forward, Refusal};
@@ -373,6 +374,10 @@ struct Job<'a> {
     filter: Filter,
     clip: ClipRegion<f64>,
     method: Method,
+    /// Where the camera meets nothing, if that is known.
+    empty: Option<Empty>,
+    /// All that it sees there is the same.
+    even: bool,
     /// When time is up.
     deadline: Option<Instant>,
 }
@@ -405,17 +410,28 @@ impl<'a> Job<'a> {
                 Method::Values(aov, if focus > 0.0 { focus as f32 } else { size as f32 })
             }
         };
+        let filter = match options.filter {
+            FilterChoice::Auto if stage.reference => Filter::Box,
+            FilterChoice::Box => Filter::Box,
+            FilterChoice::Auto | FilterChoice::BlackmanHarris => Filter::blackman_harris(),
+        };
+        let aovs: Vec<Aov> = film.sampled().collect();
+        let paths = matches!(method, Method::Path(_) | Method::Forward(_));
+        // `Fast` is to show what it takes for hits.
+        let strict = stage.accel.options().precision != Precision::Fast;
+        let empty = (paths && strict && !stage.moves() && !aovs.contains(&Aov::Heat))
+            .then(|| Empty::new(&stage.world, &camera, film.size(), filter.radius()))
+            .flatten();
+        let even = stage.fog.is_none() && !stage.lights.area.has_own() && stage.background_is_even();
         Self {
             stage,
             options,
-            aovs: film.sampled().collect(),
+            aovs,
             camera,
             cone: Cone { width: cone.width * FOOTPRINT, spread: cone.spread * FOOTPRINT },
-            filter: match options.filter {
-                FilterChoice::Auto if stage.reference => Filter::Box,
-                FilterChoice::Box => Filter::Box,
-                FilterChoice::Auto | FilterChoice::BlackmanHarris => Filter::blackman_harris(),
-            },
+            filter,
+            empty,
+            even,
             clip: region(&options.clip),
             method,
             // A limit beyond all time is none.
@@ -574,13 +590,19 @@ impl<'a> Job<'a> {
                 if !tiles.is_active(x, y) {
                     continue;
                 }
+                // What a pixel has it need not get again.
+                let from = self.options.first_sample + band.pixel(x, y)[0].count();
+                let samples = samples.start.max(from)..samples.end;
+                if self.empty.as_ref().is_some_and(|empty| empty.at(x, y)) {
+                    done.samples += u64::from(samples.end.saturating_sub(samples.start));
+                    done.bad += self.behind(tracer, band.pixel(x, y), (x, y), samples, splats);
+                    continue;
+                }
                 let profiled = self.options.profile && matches!(self.method, Method::Path(_));
                 let place = x.wrapping_mul(31).wrapping_add(y.wrapping_mul(17));
                 let timed = place.is_multiple_of(if profiled { PROFILED } else { TIMED });
                 tracer.clock = Some(clock).filter(|_| profiled && timed);
-                // What a pixel has it need not get again.
-                let from = self.options.first_sample + band.pixel(x, y)[0].count();
-                for sample in samples.start.max(from)..samples.end {
+                for sample in samples {
                     let started = tracer.clock.map(|_| Instant::now());
                     let (shot, ray) = self.shot(tracer, (x, y), sample, timed);
                     let begun = started.map(|s| s.elapsed());
@@ -663,35 +685,80 @@ impl<'a> Job<'a> {
         bad
     }
 
+    /// Takes samples of a pixel where there is nothing but what is behind all; the answer: how many were no light.
+    fn behind<K: Kernel>(
+        &self,
+        tracer: &mut Tracer<'_, K>,
+        pixel: &mut [Accumulator],
+        at: (u32, u32),
+        samples: std::ops::Range<u32>,
+        splats: Option<&Splats>,
+    ) -> u64 {
+        tracer.timed = false;
+        tracer.clock = None;
+        let mut bad = 0;
+        let mut same = None;
+        for sample in samples {
+            let seen = same.unwrap_or_else(|| {
+                let (shot, ray) = self.shot(tracer, at, sample, false);
+                self.look(tracer, &shot, ray, None, splats)
+            });
+            same = Some(seen).filter(|_| self.even);
+            bad += u64::from(!self.keep(pixel, seen, TraversalCounts::default()));
+        }
+        bad
+    }
+
     /// Takes one sample; false if its numbers were no light.
     fn sample<K: Kernel>(
         &self,
         tracer: &mut Tracer<'_, K>,
         pixel: &mut [Accumulator],
-        &Shot { pixel: (x, y), sampler, screen, .. }: &Shot,
+        shot: &Shot,
         ray: Ray<f64>,
         hit: Option<Hit>,
         splats: Option<&Splats>,
     ) -> bool {
+        let mut seen = self.look(tracer, shot, ray, hit, splats);
+        let heat = self.aovs.contains(&Aov::Heat) || matches!(self.method, Method::Values(Aov::Heat, _));
+        let cost = if heat { tracer.stage.accel.closest_hit_counted(&ray).1 } else { TraversalCounts::default() };
+        if let (Method::Values(aov, far), Some(first)) = (self.method, &seen.first) {
+            seen.color = first.shown(aov, cost, far);
+        }
+        self.keep(pixel, seen, cost)
+    }
+
+    /// What a sample sees.
+    #[inline]
+    fn look<K: Kernel>(
+        &self,
+        tracer: &mut Tracer<'_, K>,
+        &Shot { pixel: (x, y), sampler, screen, .. }: &Shot,
+        ray: Ray<f64>,
+        hit: Option<Hit>,
+        splats: Option<&Splats>,
+    ) -> Seen {
         let mut seen = match self.method {
             Method::Path(_) | Method::Forward(_) => tracer.path(ray, hit, self.cone, screen, sampler, self.limits()),
             Method::Light(_) => tracer.radiance(ray, self.cone, screen, sampler, self.limits()),
             Method::Occlusion(reach) => tracer.ambient_occlusion(ray, reach, sampler),
             Method::Values(..) => tracer.values(ray, self.cone),
         };
-        let heat = self.aovs.contains(&Aov::Heat) || matches!(self.method, Method::Values(Aov::Heat, _));
-        let cost = if heat { tracer.stage.accel.closest_hit_counted(&ray).1 } else { TraversalCounts::default() };
-        if let (Method::Values(aov, far), Some(first)) = (self.method, &seen.first) {
-            seen.color = first.shown(aov, cost, far);
-        }
         if let Some(splats) = splats {
             seen.color += splats.at(x, y);
         }
+        seen
+    }
+
+    /// Adds what a sample saw to its pixel; false if its numbers were no light.
+    #[inline]
+    fn keep(&self, pixel: &mut [Accumulator], seen: Seen, cost: TraversalCounts) -> bool {
         let good = is_light(&seen);
+        let first = seen.first;
         let Seen { color, alpha, .. } = if good { seen } else { Seen { alpha: 1.0, ..Seen::default() } };
         pixel[0].add([color.x, color.y, color.z, alpha.clamp(0.0, 1.0)]);
         for (i, aov) in self.aovs.iter().enumerate() {
-            let value = seen.first.map_or([0.0; 4], |first| first.value(*aov, cost).extend(1.0).to_array());
+            let value = first.map_or([0.0; 4], |first| first.value(*aov, cost).extend(1.0).to_array());
             pixel[1 + i].add(if value.iter().all(|v| v.is_finite()) { value } else { [0.0; 4] });
         }
         good

@@ -8,17 +8,18 @@ use firsthit_import::scene::MaterialDesc;
 use glam::{DAffine3, DVec3, Vec3};
 
 use crate::camera::{Camera, CameraError};
+use crate::dark::Dark;
 use crate::fog::Fog;
 use crate::kernel::{Full, Kernel};
 use crate::light::Lights;
 use crate::light::area::{AreaLights, Glow, ShapeLight};
 use crate::light::choice::LightChoice;
-use crate::light::environment::EnvironmentError;
+use crate::light::environment::{Environment, EnvironmentError};
 use crate::light::punctual::PunctualLight;
 use crate::material::{Conventions, Material, Textures};
 use crate::setting::{self, Setting};
 use crate::surface::World;
-use crate::texture::{TextureError, TextureLookup};
+use crate::texture::TextureError;
 use crate::{
     Background, CameraChoice, EffectPlan, EffectSet, KernelChoice, StageOptions, TextureFilter, framing, motion, survey,
 };
@@ -74,6 +75,8 @@ pub struct Stage {
     /// One for each material of the scene, then the default material.
     pub(crate) materials: Arc<[Material]>,
     pub(crate) flags: Arc<[Flags]>,
+    /// What does not glow although its material does.
+    dark: Arc<Dark>,
     pub(crate) lights: Lights,
     pub(crate) camera: Camera,
     pub(crate) background: Backdrop,
@@ -95,11 +98,13 @@ pub(crate) struct Flags {
     pub(crate) culls: bool,
     /// Alpha counts.
     pub(crate) alpha: bool,
+    /// It glows as a texture says.
+    pub(crate) glows: bool,
     /// Shadow rays may pass.
     pub(crate) lets_through: bool,
     /// It looks textures up.
     pub(crate) textured: bool,
-    /// Other rays than those that scatter at it look up its textures, always sharp.
+    /// Rays that pass it look up its textures, always sharp.
     pub(crate) sharp: bool,
 }
 
@@ -216,9 +221,10 @@ impl Stage {
         let flags = materials.iter().map(|m| Flags {
             culls: !reference && m.culls(),
             alpha: m.has_alpha(),
+            glows: m.glows() && m.emissive_texture().is_some(),
             lets_through: m.lets_through(),
             textured: m.is_textured(),
-            sharp: !mips || m.lets_through() || m.glows(),
+            sharp: !mips || m.lets_through(),
         });
         let flags: Arc<[Flags]> = flags.collect();
         // What no surface has keeps no kernel from being small.
@@ -237,7 +243,8 @@ impl Stage {
             punctual.extend(world.scene.lights.iter().filter_map(|l| PunctualLight::new(&l.kind)));
             punctual.extend(headlight.as_ref().map(survey::Headlight::light));
         }
-        let area = glowing(&world, &materials, effects);
+        let dark = Arc::new(Dark::new(&world, &materials));
+        let area = glowing(&world, &materials, &dark, effects);
         if area.unsampled > 0 {
             explain.push(format!(
                 "light: {} glowing shapes other than plain balls are seen and mirrored, but light nothing else",
@@ -260,6 +267,7 @@ impl Stage {
             accel,
             materials,
             flags,
+            dark,
             lights,
             camera,
             background,
@@ -287,7 +295,7 @@ impl Stage {
         let places = motion::transforms(self.scene(), time);
         let accel = self.accel.with_transforms(&places).map_err(|e| StageError::Motion(e.to_string()))?;
         let world = World::new(Arc::clone(self.scene()), places);
-        let area = glowing(&world, &self.materials, self.plan.simulated());
+        let area = glowing(&world, &self.materials, &self.dark, self.plan.simulated());
         let choice = LightChoice::new(&self.lights.punctual, &area, self.lights.environment.as_ref(), studio);
         Ok(Self { world, accel, lights: Lights { area, choice, ..self.lights.clone() }, ..self.clone() })
     }
@@ -301,6 +309,21 @@ impl Stage {
             return material.glow::<K>(&self.world.surface(hit, point, -looking, 0.0));
         }
         material.glow::<K>(&self.world.attributes(hit, true))
+    }
+
+    /// Whether a hit is known not to glow.
+    #[inline]
+    pub(crate) fn is_dark(&self, id: HitId, material: usize) -> bool {
+        self.flags[material].glows && self.dark.is_dark(&self.world, id)
+    }
+
+    /// Whether what is behind all looks the same everywhere in the picture.
+    pub(crate) fn background_is_even(&self) -> bool {
+        match self.background {
+            Backdrop::Color(_) | Backdrop::Transparent => true,
+            Backdrop::Environment => self.lights.environment.as_ref().is_none_or(Environment::is_constant),
+            Backdrop::Studio(_) => false,
+        }
     }
 
     /// Whether anything moves.
@@ -354,7 +377,7 @@ impl Stage {
 }
 
 /// The glowing surfaces of a scene.
-fn glowing(world: &World, materials: &[Material], effects: EffectSet) -> AreaLights {
+fn glowing(world: &World, materials: &[Material], dark: &Dark, effects: EffectSet) -> AreaLights {
     if !effects.contains(EffectSet::AREA_LIGHTS) {
         return AreaLights::default();
     }
@@ -371,10 +394,7 @@ fn glowing(world: &World, materials: &[Material], effects: EffectSet) -> AreaLig
             };
             Some(of(id)).filter(|m| m.glows()).map(glow)
         },
-        |id| {
-            let uv = |t: &TextureLookup| world.corner_uvs(id, t.uv_set());
-            of(id).emissive_texture().is_some_and(|t| uv(t).is_some_and(|uv| t.is_black_over(uv)))
-        },
+        |id| dark.is_dark(world, id),
         |id, u, v| {
             let hit = Hit { id, t: 0.0, u, v, normal: DVec3::Z };
             let (material, at) = (of(id), world.attributes(&hit, true));

@@ -78,6 +78,12 @@ impl World {
         }
     }
 
+    /// The mesh that an instance places.
+    #[inline]
+    pub(crate) fn mesh_of(&self, id: HitId) -> usize {
+        self.instances[id.instance as usize].mesh
+    }
+
     /// Texture coordinates of a triangle's corners; `None` where there are none.
     pub(crate) fn corner_uvs(&self, id: HitId, set: usize) -> Option<[Vec2; 3]> {
         let Part::Triangle { mesh, corners, .. } = self.part(id, 0.0, 0.0) else { return None };
@@ -116,9 +122,11 @@ impl World {
             geometric: Vec3::Z,
             smooth: Vec3::Z,
             curved: false,
+            cone: 0.0,
             width: 0.0,
             colors: Colors::All(1),
             seen: None,
+            dark: false,
             clock: None,
         }
     }
@@ -142,9 +150,11 @@ impl World {
             geometric,
             smooth: geometric,
             curved: false,
+            cone: width,
             width,
             colors: Colors::All(1),
             seen: None,
+            dark: false,
             clock: None,
         };
         if let Some(n) = surface.vertex_normal() {
@@ -165,6 +175,15 @@ enum Part<'a> {
     Shape { uv: Vec2, uv_per_length: f32 },
 }
 
+/// How textures are looked at.
+#[derive(Clone, Copy, Debug)]
+struct Look {
+    uv: Vec2,
+    footprint: f32,
+    /// The same for what is always seen sharp.
+    sharp: f32,
+}
+
 /// A point of a surface as shading sees it. All directions are unit and in the world.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Surface<'a> {
@@ -183,12 +202,16 @@ pub(crate) struct Surface<'a> {
     pub(crate) smooth: Vec3,
     /// Whether there are vertex normals.
     curved: bool,
-    /// Width of the cone of view here, world units.
+    /// Width of the camera's view here, world units.
+    cone: f32,
+    /// Width of what is seen here as one: of that, or of all that a scattered path stands for.
     width: f32,
     /// Which colours the path is about that came here.
     pub(crate) colors: Colors,
-    /// Coordinates of the first set, and the footprint there, once they are known.
-    seen: Option<(Vec2, f32)>,
+    /// What textures of the first set are asked for, once that is known.
+    seen: Option<Look>,
+    /// It is known not to glow.
+    pub(crate) dark: bool,
     /// Times the look-ups of textures here.
     pub(crate) clock: Option<&'a Clock>,
 }
@@ -220,14 +243,17 @@ impl Surface<'_> {
 
     /// Works out once what every texture of the first set asks for, with a cone of view that is at least this wide.
     pub(crate) fn look(&mut self, width: f32) {
-        self.width = self.width.max(width);
-        self.seen = Some(self.timed(|| (self.uv(0), self.footprint(0))));
+        self.width = self.cone.max(width);
+        self.seen = Some(self.timed(|| {
+            let scale = self.uv_per_length(0);
+            Look { uv: self.uv(0), footprint: finite(self.width * scale), sharp: finite(self.cone * scale) }
+        }));
     }
 
     /// Texture coordinates; (0, 0) where the mesh lacks the set.
     pub(crate) fn uv(&self, set: usize) -> Vec2 {
-        if let (Some((uv, _)), 0) = (self.seen, set) {
-            return uv;
+        if let (Some(look), 0) = (self.seen, set) {
+            return look.uv;
         }
         match self.part {
             Part::Triangle { mesh, corners, weights } => match mesh.uvs.get(set).filter(|uvs| !uvs.is_empty()) {
@@ -255,26 +281,38 @@ impl Surface<'_> {
         [mesh.positions[corners[1]] - a, mesh.positions[corners[2]] - a]
     }
 
-    /// How wide the cone of view is in texture coordinates. Where the surface is seen at an angle, between the width
-    /// across and the one along: its area is right.
+    /// How wide what is seen as one is in texture coordinates.
     pub(crate) fn footprint(&self, set: usize) -> f32 {
-        if let (Some((_, footprint)), 0) = (self.seen, set) {
-            return footprint;
+        match (self.seen, set) {
+            (Some(look), 0) => look.footprint,
+            _ if self.width <= 0.0 => 0.0,
+            _ => finite(self.width * self.uv_per_length(set)),
         }
-        if self.width <= 0.0 {
-            return 0.0;
+    }
+
+    /// How wide the camera's view is in texture coordinates: of what light asks for as well as sight, which must be the
+    /// same to both.
+    pub(crate) fn sharp_footprint(&self, set: usize) -> f32 {
+        match (self.seen, set) {
+            (Some(look), 0) => look.sharp,
+            _ if self.cone <= 0.0 => 0.0,
+            _ => finite(self.cone * self.uv_per_length(set)),
         }
-        let width = self.width / self.wo.dot(self.geometric).abs().max(0.01).sqrt();
+    }
+
+    /// How much of texture coordinates a unit of a view's width spans. Where the surface is seen at an angle, between the
+    /// width across and the one along: its area is right.
+    fn uv_per_length(&self, set: usize) -> f32 {
+        let slant = self.wo.dot(self.geometric).abs().max(0.01);
         match self.part {
             Part::Triangle { mesh, corners, .. } => {
                 let Some(uvs) = mesh.uvs.get(set).filter(|uvs| !uvs.is_empty()) else { return 0.0 };
                 let [e1, e2] = Self::edges(mesh, corners).map(|e| self.instance.vectors * e);
                 let area = e1.cross(e2).length();
                 let uv_area = (uvs[corners[1]] - uvs[corners[0]]).perp_dot(uvs[corners[2]] - uvs[corners[0]]).abs();
-                let width = width * (uv_area / area).sqrt();
-                if width.is_finite() { width } else { 0.0 }
+                (uv_area / (area * slant)).sqrt()
             }
-            Part::Shape { uv_per_length, .. } => width * uv_per_length,
+            Part::Shape { uv_per_length, .. } => uv_per_length / slant.sqrt(),
         }
     }
 
@@ -390,6 +428,11 @@ impl Surface<'_> {
         }
         blend(fine)
     }
+}
+
+/// A width, if it is one.
+fn finite(width: f32) -> f32 {
+    if width.is_finite() { width } else { 0.0 }
 }
 
 /// How a straight ray crosses a primitive.

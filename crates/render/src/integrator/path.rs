@@ -218,7 +218,8 @@ impl<K: Kernel> Tracer<'_, K> {
         let index = stage.world.material(hit.id);
         let material = &stage.materials[index];
         if K::TEXTURES && stage.flags[index].textured {
-            // What glows or has holes is asked for by light as well, which sees it sharp.
+            surface.dark = stage.is_dark(hit.id, index);
+            // What has holes or is clear is asked for by light as well, which sees it sharp; so is what glows.
             let spread = if stage.flags[index].sharp { 0.0 } else { walk.spread * hit.t as f32 };
             surface.look(spread);
         }

@@ -254,11 +254,15 @@ impl Pbr {
             tally::sample(EffectSet::UNLIT);
             return self.base::<K>(surface).xyz();
         }
-        if self.emissive == Vec3::ZERO {
+        if self.emissive == Vec3::ZERO || surface.dark {
             return Vec3::ZERO;
         }
         tally::sample(EffectSet::EMISSION);
-        let emission = self.emissive * color::<K>(self.emissive_texture.as_ref(), surface).xyz();
+        let mut emission = self.emissive;
+        if let Some(t) = self.emissive_texture.as_ref().filter(|_| K::TEXTURES) {
+            let set = t.uv_set();
+            emission *= surface.look_up(|| t.color(surface.uv(set), surface.sharp_footprint(set))).xyz();
+        }
         match self.layers.as_deref().filter(|_| K::LAYERS) {
             Some(layers) => emission * layers.under_coat::<K>(surface, !conventions.reference),
             None => emission,
