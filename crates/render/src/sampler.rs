@@ -19,6 +19,8 @@
 //! the Laine-Karras one (*Building a Better LK Hash*, 2021). The second coordinate is computed as by Ahmed, *An
 //! Implementation Algorithm of 2D Sobol Sequence Fast, Elegant, and Compact* (2024).
 
+use std::cell::Cell;
+
 /// What a sample is for. The number is the bounce: 0 at the camera's first hit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Dimension {
@@ -147,15 +149,7 @@ impl PixelSampler {
     #[must_use]
     pub fn get2(&self, dimension: Dimension) -> [f32; 2] {
         let dimension = dimension.index();
-        if self.independent || dimension >= Dimension::INDEPENDENT {
-            return self.random(dimension);
-        }
-        let key = combine(self.key, dimension);
-        let first = laine_karras(self.sample, key);
-        [
-            to_unit(owen_scramble(first ^ self.shift(combine(key, 3)), combine(key, 1))),
-            to_unit(owen_scramble(sobol_second(first) ^ self.shift(combine(key, 4)), combine(key, 2))),
-        ]
+        if self.is_random(dimension) { self.random(dimension) } else { self.scramble(dimension).point(self.sample) }
     }
 
     /// A number in [0, 1).
@@ -163,12 +157,27 @@ impl PixelSampler {
     #[must_use]
     pub fn get1(&self, dimension: Dimension) -> f32 {
         let dimension = dimension.index();
-        if self.independent || dimension >= Dimension::INDEPENDENT {
-            return self.random(dimension)[0];
+        if self.is_random(dimension) {
+            self.random(dimension)[0]
+        } else {
+            self.scramble(dimension).coordinate(self.sample)
         }
+    }
+
+    /// Whether numbers of this dimension are independent.
+    #[inline]
+    fn is_random(&self, dimension: u32) -> bool {
+        self.independent || dimension >= Dimension::INDEPENDENT
+    }
+
+    /// What the points of this pixel have in common in a dimension.
+    fn scramble(&self, dimension: u32) -> Scramble {
         let key = combine(self.key, dimension);
-        let first = laine_karras(self.sample, key);
-        to_unit(owen_scramble(first ^ self.shift(combine(key, 3)), combine(key, 1)))
+        Scramble {
+            order: key,
+            shifts: [self.shift(combine(key, 3)).reverse_bits(), self.shift(combine(key, 4)).reverse_bits()],
+            keys: [combine(key, 1), combine(key, 2)],
+        }
     }
 
     /// What tells this pixel's points from those of other pixels. Level r of the shift is the sum of C(r, c) m_c over
@@ -176,12 +185,7 @@ impl PixelSampler {
     /// determinant 1, so whatever levels the samples of a pixel have filled, the next k tell 2^k pixels apart.
     #[inline]
     fn shift(&self, key: u32) -> u32 {
-        let mut x = laine_karras(self.place, key);
-        x ^= (x >> 1) & 0x5555_5555;
-        x ^= (x >> 2) & 0x3333_3333;
-        x ^= (x >> 4) & 0x0f0f_0f0f;
-        x ^= (x >> 8) & 0x00ff_00ff;
-        x ^ (x >> 16)
+        pascal(laine_karras(self.place, key))
     }
 
     /// Independent numbers: the PCG hash of four words of Jarzynski and Olano, *Hash Functions for GPU Rendering*,
@@ -198,6 +202,99 @@ impl PixelSampler {
             [x, y, z, w] = [x, y, z, w].map(|v| v ^ (v >> 16));
         }
         [to_unit(x), to_unit(y)]
+    }
+}
+
+/// What the points of all samples of a pixel have in common in one dimension. Bits are in the order of the sample's number,
+/// the lowest first: that of points reversed.
+#[derive(Clone, Copy, Debug)]
+struct Scramble {
+    /// Of the order of samples.
+    order: u32,
+    /// Of the two coordinates.
+    shifts: [u32; 2],
+    keys: [u32; 2],
+}
+
+impl Scramble {
+    /// The point of a sample, whose number is given with its bits reversed. Owen's scrambling flips each bit by a hash of
+    /// the bits above it, which are those below it in this order.
+    #[inline]
+    fn point(&self, sample: u32) -> [f32; 2] {
+        let index = laine_karras(sample, self.order).reverse_bits();
+        let x = laine_karras(index ^ self.shifts[0], self.keys[0]);
+        let y = laine_karras(pascal(index) ^ self.shifts[1], self.keys[1]);
+        // Both at once.
+        let turned = (u64::from(x) | u64::from(y) << 32).reverse_bits();
+        [to_unit((turned >> 32) as u32), to_unit(turned as u32)]
+    }
+
+    /// The first coordinate of that.
+    #[inline]
+    fn coordinate(&self, sample: u32) -> f32 {
+        let index = laine_karras(sample, self.order).reverse_bits();
+        to_unit(laine_karras(index ^ self.shifts[0], self.keys[0]).reverse_bits())
+    }
+}
+
+/// The points of [`PixelSampler`]s, for one thread: what samples of a pixel have in common is worked out once for those that
+/// follow each other.
+#[derive(Debug)]
+pub(crate) struct Points {
+    known: [Cell<Known>; Dimension::INDEPENDENT as usize],
+}
+
+impl Default for Points {
+    fn default() -> Self {
+        Self { known: [const { Cell::new(Known::NOTHING) }; Dimension::INDEPENDENT as usize] }
+    }
+}
+
+/// A pixel, by what is asked of its sampler, and its scramble in one dimension.
+#[derive(Clone, Copy, Debug)]
+struct Known {
+    pixel: Option<(u32, u32)>,
+    scramble: Scramble,
+}
+
+impl Known {
+    const NOTHING: Self = Self { pixel: None, scramble: Scramble { order: 0, shifts: [0; 2], keys: [0; 2] } };
+}
+
+impl Points {
+    /// [`PixelSampler::get2`].
+    #[inline]
+    pub(crate) fn get2(&self, sampler: &PixelSampler, dimension: Dimension) -> [f32; 2] {
+        let dimension = dimension.index();
+        if sampler.is_random(dimension) {
+            sampler.random(dimension)
+        } else {
+            self.scramble(sampler, dimension).point(sampler.sample)
+        }
+    }
+
+    /// [`PixelSampler::get1`].
+    #[inline]
+    pub(crate) fn get1(&self, sampler: &PixelSampler, dimension: Dimension) -> f32 {
+        let dimension = dimension.index();
+        if sampler.is_random(dimension) {
+            sampler.random(dimension)[0]
+        } else {
+            self.scramble(sampler, dimension).coordinate(sampler.sample)
+        }
+    }
+
+    #[inline]
+    fn scramble(&self, sampler: &PixelSampler, dimension: u32) -> Scramble {
+        let place = &self.known[dimension as usize];
+        let known = place.get();
+        let pixel = Some((sampler.key, sampler.place));
+        if known.pixel == pixel {
+            return known.scramble;
+        }
+        let scramble = sampler.scramble(dimension);
+        place.set(Known { pixel, scramble });
+        scramble
     }
 }
 
@@ -235,22 +332,16 @@ fn laine_karras(mut x: u32, key: u32) -> u32 {
     x ^ x.wrapping_mul(0x53a2_2864)
 }
 
-/// Nested uniform (Owen) scrambling in base 2: every bit is flipped by a hash of the bits above it.
+/// Pascal's triangle modulo 2, whose entry C(c, r) is odd where the bits of r are among those of c, times the bits of a number.
+/// It is the generator matrix of the second coordinate of Sobol points.
 #[inline]
-fn owen_scramble(x: u32, key: u32) -> u32 {
-    laine_karras(x.reverse_bits(), key).reverse_bits()
-}
-
-/// The second coordinate of the Sobol point whose first is given: its generator matrix is Pascal's triangle modulo 2,
-/// whose entry C(c, r) is odd where the bits of r are among those of c.
-#[inline]
-fn sobol_second(first: u32) -> u32 {
-    let mut x = first;
-    x ^= (x & 0x5555_5555) << 1;
-    x ^= (x & 0x3333_3333) << 2;
-    x ^= (x & 0x0f0f_0f0f) << 4;
-    x ^= (x & 0x00ff_00ff) << 8;
-    x ^ (x << 16)
+fn pascal(index: u32) -> u32 {
+    let mut x = index;
+    x ^= (x >> 1) & 0x5555_5555;
+    x ^= (x >> 2) & 0x3333_3333;
+    x ^= (x >> 4) & 0x0f0f_0f0f;
+    x ^= (x >> 8) & 0x00ff_00ff;
+    x ^ (x >> 16)
 }
 
 /// The upper 24 bits as a number in [0, 1): all of them are exact in f32.
@@ -377,7 +468,7 @@ mod tests {
     #[test]
     fn the_second_coordinate_is_that_of_the_sobol_sequence() {
         for i in (0..1000).chain([u32::MAX, 1 << 31, 0x1234_5678]) {
-            assert_eq!(sobol_second(i.reverse_bits()), second_by_columns(i), "{i}");
+            assert_eq!(pascal(i).reverse_bits(), second_by_columns(i), "{i}");
         }
     }
 

@@ -13,7 +13,7 @@ use crate::fog::Fog;
 use crate::kernel::Kernel;
 use crate::light::{LightEnd, LightSample};
 use crate::material::Colors;
-use crate::sampler::{Dimension, PixelSampler};
+use crate::sampler::{Dimension, PixelSampler, Points};
 use crate::{EffectSet, RayCounts, RayKind, Stage, tally};
 
 /// Time spent in rays of each kind, on pixels that are timed.
@@ -95,6 +95,7 @@ pub(crate) struct Tracer<'a, K: Kernel> {
     pub(crate) clock: Option<&'a Clock>,
     /// Fog, for those who simulate it.
     pub(crate) fog: Option<&'a Fog>,
+    points: Points,
     kernel: PhantomData<K>,
 }
 
@@ -115,6 +116,7 @@ impl<'a, K: Kernel> Tracer<'a, K> {
             timed: false,
             clock: None,
             fog: None,
+            points: Points::default(),
             kernel: PhantomData,
         }
     }
@@ -141,8 +143,8 @@ impl<'a, K: Kernel> Tracer<'a, K> {
     #[inline]
     pub(crate) fn draw2(&self, sampler: &PixelSampler, dimension: Dimension) -> [f32; 2] {
         match self.clock {
-            None => sampler.get2(dimension),
-            Some(clock) => clock.sampling(|| sampler.get2(dimension)),
+            None => self.points.get2(sampler, dimension),
+            Some(clock) => clock.sampling(|| self.points.get2(sampler, dimension)),
         }
     }
 
@@ -150,8 +152,8 @@ impl<'a, K: Kernel> Tracer<'a, K> {
     #[inline]
     pub(crate) fn draw1(&self, sampler: &PixelSampler, dimension: Dimension) -> f32 {
         match self.clock {
-            None => sampler.get1(dimension),
-            Some(clock) => clock.sampling(|| sampler.get1(dimension)),
+            None => self.points.get1(sampler, dimension),
+            Some(clock) => clock.sampling(|| self.points.get1(sampler, dimension)),
         }
     }
 
