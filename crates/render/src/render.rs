@@ -512,6 +512,7 @@ impl<'a> Job<'a> {
                     .map(|(mut band, complete)| {
                         let clock = Clock::default();
                         let mut tracer = Tracer::<K>::new(self.stage, &self.clip);
+                        tracer.wants_first = !self.aovs.is_empty();
                         if matches!(self.method, Method::Path(_)) {
                             tracer.fog = self.stage.fog.as_ref();
                         }

@@ -233,7 +233,7 @@ impl<K: Kernel> Tracer<'_, K> {
             }
         }
         let shading = material.shade::<K>(&surface);
-        if seen.first.is_none() && walk.straight {
+        if self.wants_first && walk.straight && seen.first.is_none() {
             seen.first = Some(aov::First::new(&walk.ray, hit, &surface, &shading, index));
         }
         if shading.emission != Vec3::ZERO {
@@ -313,7 +313,7 @@ impl<K: Kernel> Tracer<'_, K> {
             LobeKind::TRANSMISSION => RayKind::Transmission,
             _ => RayKind::Indirect,
         };
-        if let Some(pdf) = on.pdf {
+        if let Some(pdf) = on.pdf.filter(|_| K::TEXTURES) {
             walk.spread = walk.spread.max((VIEW / pdf).sqrt());
         }
         walk.straight &= unbent;

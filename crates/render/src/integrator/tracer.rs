@@ -96,6 +96,8 @@ pub(crate) struct Tracer<'a, K: Kernel> {
     /// Fog, for those who simulate it.
     pub(crate) fog: Option<&'a Fog>,
     points: Points,
+    /// What the first surface looks like is to be told.
+    pub(crate) wants_first: bool,
     kernel: PhantomData<K>,
 }
 
@@ -117,6 +119,7 @@ impl<'a, K: Kernel> Tracer<'a, K> {
             clock: None,
             fog: None,
             points: Points::default(),
+            wants_first: false,
             kernel: PhantomData,
         }
     }

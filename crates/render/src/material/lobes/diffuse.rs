@@ -1,11 +1,12 @@
 //! Lambert's diffuse reflection, optionally under a reflecting coat.
 
-use std::f32::consts::{FRAC_1_PI, PI};
+use std::f32::consts::FRAC_1_PI;
 
 use glam::Vec3;
 
 use super::LobeSample;
 use crate::material::fresnel::Fresnel;
+use crate::warp;
 
 /// Reflects evenly in all directions what a coat, if there is one, lets through.
 #[derive(Clone, Copy, Debug)]
@@ -36,9 +37,7 @@ impl Lambert {
     }
 
     pub(super) fn sample(&self, wo: Vec3, u: [f32; 2]) -> Option<LobeSample> {
-        let r = u[0].sqrt();
-        let (sin, cos) = (2.0 * PI * u[1]).sin_cos();
-        let wi = Vec3::new(r * cos, r * sin, (1.0 - u[0]).max(0.0).sqrt());
+        let wi = warp::cosine_hemisphere(u);
         let pdf = self.pdf(wo, wi);
         (pdf > 0.0).then(|| LobeSample { wi, weight: self.albedo * self.passed(wo, wi), pdf: Some(pdf) })
     }
