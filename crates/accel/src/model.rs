@@ -406,6 +406,15 @@ impl Model {
         }
     }
 
+    /// The place of a triangle in the tree.
+    #[inline]
+    pub(crate) fn place(&self, id: PrimitiveId) -> Option<usize> {
+        match self.places.get(id.geometry as usize)? {
+            Places::Triangles(places) => places.get(id.primitive as usize).map(|place| *place as usize),
+            Places::Shape(_) => None,
+        }
+    }
+
     /// Offers the hits of what is in the tree to the collector; `transform` is the instance's.
     #[inline(always)]
     pub(crate) fn trace<const SURFACES: bool, K: Kernel, C: Collector, P: Probe>(

@@ -39,6 +39,9 @@ impl<'a, const SURFACES: bool, K: Kernel> OfferTriangle<'a, SURFACES, K> {
         collector: &mut C,
         probe: &mut P,
     ) -> ControlFlow<(), Option<f32>> {
+        if collector.leaves_out(place) {
+            return ControlFlow::Continue(None);
+        }
         let found = match known {
             _ if SURFACES => K::crosses(&self.setup, self.ray, triangle, self.limit),
             Some(known) => K::test_known(&self.setup, self.ray, triangle, known, self.limit),

@@ -44,7 +44,11 @@ fn bounce(scene: &Scene, place: DAffine3, count: usize) -> (usize, f64) {
         for side in [1.0, -1.0] {
             let direction = leaving(&mut rng, hit.normal * side);
             // No source is skipped here: the offset alone must do.
-            let next = scene.closest_hit(&Ray::new(point.spawn(direction), direction));
+            let away = Ray::new(point.spawn(direction), direction);
+            let next = scene.closest_hit(&away);
+            // Nor does it change anything where it is left out.
+            assert_eq!(next, scene.closest_hit_from(&away, hit.id));
+            assert_eq!(next.is_some(), scene.any_hit_from(&away, hit.id));
             again += usize::from(next.is_some_and(|n| n.id == hit.id && n.t * 1e3 < place.matrix3.x_axis.length()));
         }
     }

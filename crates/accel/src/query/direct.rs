@@ -6,17 +6,17 @@ use core::ops::ControlFlow;
 
 use firsthit_geometry::{Precision, Ray, transform::Transform};
 
-use super::{Any, Closest, Collect, Collector};
+use super::{Any, Closest, Collect, Collector, Leaving};
 use crate::kernel::{Double, Exact, Fast, Guarded, Kernel, Robust};
 use crate::layout::compact8::Compact8;
 use crate::layout::wide8::Wide8;
-use crate::model::Model;
+use crate::model::{Model, PrimitiveId};
 use crate::packet::{self, Courses, Packet, Tier};
 use crate::scene::{Inner, is_interval};
 use crate::simd::{self, Available, Lanes, Work};
 use crate::stats::Off;
 use crate::wide::WideTree;
-use crate::{Guards, Hit, Scene};
+use crate::{Guards, Hit, HitId, Scene};
 
 /// The guards that the tier `Robust` has in queries.
 const NEEDED: Guards = Guards::ALL.difference(Guards::OFFSET);
@@ -68,6 +68,31 @@ impl Scene {
                 simd::run(level, InPackets { only, asked, rays, answers: hits, tier: PhantomData::<Robust> });
             }
             _ => self.inner().by_kernel(AnyHits { scene: self, rays, hits }),
+        }
+    }
+}
+
+/// Rays that leave a triangle.
+impl Scene {
+    /// [`Scene::closest_hit`] of a ray that starts where [`SurfacePoint::spawn`] says on the triangle `source`, and goes away
+    /// from it: the same answer, found sooner. That the ray does not meet the triangle that it comes from would take many
+    /// digits to tell; here that triangle is not tested (where the precision is [`Precision::Robust`], of scenes of one instance).
+    ///
+    /// [`SurfacePoint::spawn`]: crate::SurfacePoint::spawn
+    #[must_use]
+    pub fn closest_hit_from(&self, ray: &Ray<f64>, source: HitId) -> Option<Hit> {
+        match self.inner().left(source) {
+            Some((level, only, place)) => simd::run(level, ClosestHitFrom { only, scene: self, ray, place }),
+            None => self.closest_hit(ray),
+        }
+    }
+
+    /// [`Scene::any_hit`] of a ray as for [`Scene::closest_hit_from`].
+    #[must_use]
+    pub fn any_hit_from(&self, ray: &Ray<f64>, source: HitId) -> bool {
+        match self.inner().left(source) {
+            Some((level, only, place)) => simd::run(level, AnyHitFrom { only, ray, place }),
+            None => self.any_hit(ray),
         }
     }
 }
@@ -252,6 +277,47 @@ impl<T: WideTree, K: Kernel> Work for AnyHitOf<'_, T, K> {
     #[inline(always)]
     fn run<L: Lanes>(self) -> bool {
         self.only.any::<L, K>(self.ray)
+    }
+}
+
+/// [`Scene::closest_hit_from`] in the only instance.
+struct ClosestHitFrom<'a> {
+    only: Only<'a, Wide8>,
+    scene: &'a Scene,
+    ray: &'a Ray<f64>,
+    place: usize,
+}
+
+impl Work for ClosestHitFrom<'_> {
+    type Output = Option<Hit>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Option<Hit> {
+        let Self { only, scene, ray, place } = self;
+        let order = |a, b| scene.comes_first(ray, a, b);
+        let collector = Collect::new(ray, None, |_| true, Closest { order, best: None });
+        let mut closest = Leaving { collector, place };
+        let _ = only.trace::<L, Robust, _>(ray, &mut closest);
+        let hit = closest.collector.take.best?;
+        Some(Hit { normal: only.transform.normal(hit.normal), ..hit })
+    }
+}
+
+/// [`Scene::any_hit_from`] in the only instance.
+struct AnyHitFrom<'a> {
+    only: Only<'a, Wide8>,
+    ray: &'a Ray<f64>,
+    place: usize,
+}
+
+impl Work for AnyHitFrom<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> bool {
+        let Self { only, ray, place } = self;
+        let mut any = Leaving { collector: Collect::new(ray, None, |_| true, Any), place };
+        only.trace::<L, Robust, _>(ray, &mut any).is_break()
     }
 }
 
@@ -446,6 +512,18 @@ impl Inner {
         let model = &self.models[instance.model as usize];
         let (tree, level) = model.wide()?;
         Some((level, Only { model, tree, transform: &instance.transform }))
+    }
+
+    /// The only instance of a scene and the place there of a triangle that rays leave.
+    #[inline(always)]
+    fn left(&self, source: HitId) -> Option<(Available, Only<'_, Wide8>, usize)> {
+        if self.options.precision != Precision::Robust || !self.options.guards.contains(NEEDED | Guards::OFFSET) {
+            return None;
+        }
+        let (level, only) = self.only()?;
+        let id = PrimitiveId { geometry: source.geometry, primitive: source.primitive };
+        let place = only.model.place(id)?;
+        Some((level, only, place))
     }
 
     /// The same of a compact tree; for the tiers that are asked most alone, so that not everything is compiled twice.

@@ -47,6 +47,11 @@ pub(crate) trait Collector {
     fn offer(&mut self, hit: Candidate) -> ControlFlow<(), bool>;
     /// Whether finding near hits first helps.
     fn ordered(&self) -> bool;
+    /// Whether the triangle at this place of a model's tree need not be tested.
+    #[inline(always)]
+    fn leaves_out(&self, _place: usize) -> bool {
+        false
+    }
 }
 
 /// What a query does with the hits that it wants.
@@ -99,6 +104,35 @@ impl<F: FnMut(&Hit) -> bool, T: Take> Collector for Collect<F, T> {
     #[inline(always)]
     fn ordered(&self) -> bool {
         T::ORDERED
+    }
+}
+
+/// A collector of the hits of a ray that leaves one triangle of a model, so that it cannot meet it.
+pub(crate) struct Leaving<C> {
+    pub(crate) collector: C,
+    pub(crate) place: usize,
+}
+
+impl<C: Collector> Collector for Leaving<C> {
+    #[inline(always)]
+    fn t_min(&self) -> f64 {
+        self.collector.t_min()
+    }
+    #[inline(always)]
+    fn t_max(&self) -> f64 {
+        self.collector.t_max()
+    }
+    #[inline(always)]
+    fn offer(&mut self, hit: Candidate) -> ControlFlow<(), bool> {
+        self.collector.offer(hit)
+    }
+    #[inline(always)]
+    fn ordered(&self) -> bool {
+        self.collector.ordered()
+    }
+    #[inline(always)]
+    fn leaves_out(&self, place: usize) -> bool {
+        self.place == place
     }
 }
 

@@ -470,7 +470,9 @@ impl<K: Kernel> Tracer<'_, K> {
         if self.fog.is_some() && (behind || !at.inside) {
             light *= self.through_fog(origin, sample);
         }
-        light * self.lit(kind, origin, sample, surface.id)
+        // What is just below the flat triangle is lit through it.
+        let away = side > 0.0 || !(before && terminator);
+        light * self.lit(kind, origin, sample, surface.id, away)
     }
 }
 

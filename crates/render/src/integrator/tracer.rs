@@ -186,8 +186,11 @@ impl<'a, K: Kernel> Tracer<'a, K> {
     pub(crate) fn closest(&mut self, kind: RayKind, ray: &Ray<f64>, source: Option<HitId>) -> Option<Hit> {
         self.timed(kind, |this| {
             let ray = this.clipped(ray)?;
-            // A spawned ray starts off its surface for certain: nothing has to be left out.
-            let hit = this.stage.accel.closest_hit(&ray);
+            // A spawned ray starts off its surface for certain: to leave that out is only faster.
+            let hit = match source {
+                Some(source) => this.stage.accel.closest_hit_from(&ray, source),
+                None => this.stage.accel.closest_hit(&ray),
+            };
             if K::FILTERED { this.seen(&ray, source, hit) } else { hit }
         })
     }
@@ -295,8 +298,9 @@ impl<'a, K: Kernel> Tracer<'a, K> {
 
     /// The share of a light sample's light that arrives on a way which paths do not take in part: shadow rays pass
     /// holes, partly covering surfaces and smooth sheets, and are stopped by solids, by what is rough, and by lights
-    /// that stand in the way. Only the light of what no path can meet passes smooth solids.
-    pub(crate) fn lit(&mut self, kind: RayKind, from: DVec3, sample: &LightSample, source: HitId) -> Vec3 {
+    /// that stand in the way. Only the light of what no path can meet passes smooth solids. `away`: the ray goes away from its
+    /// source for certain.
+    pub(crate) fn lit(&mut self, kind: RayKind, from: DVec3, sample: &LightSample, source: HitId, away: bool) -> Vec3 {
         if !self.shadows {
             return Vec3::ONE;
         }
@@ -311,7 +315,9 @@ impl<'a, K: Kernel> Tracer<'a, K> {
                 let clear = if sample.pdf.is_none() { Clear::Smooth } else { Clear::SmoothSheets };
                 return this.filtered_transmittance(&ray, sample.target, source, clear);
             }
-            if this.stage.accel.any_hit(&ray) { Vec3::ZERO } else { Vec3::ONE }
+            let accel = &this.stage.accel;
+            let blocked = if away { accel.any_hit_from(&ray, source) } else { accel.any_hit(&ray) };
+            if blocked { Vec3::ZERO } else { Vec3::ONE }
         })
     }
 

@@ -121,6 +121,6 @@ impl<K: Kernel> Tracer<'_, K> {
             _ => 1.0,
         };
         let light = sample.radiance * (phase * share) * self.through_fog(point, sample);
-        if light.max_element() > 0.0 { light * self.lit(kind, point, sample, NOWHERE) } else { Vec3::ZERO }
+        if light.max_element() > 0.0 { light * self.lit(kind, point, sample, NOWHERE, false) } else { Vec3::ZERO }
     }
 }
