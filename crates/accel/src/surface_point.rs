@@ -24,7 +24,7 @@ impl Scene {
             // Hits of queries have unit normals; filters see others.
             Surface::Triangle(v) if transform.is_uniform() && hit.normal.is_normalized() => {
                 let (point, error) = on_triangle(v, hit, precision);
-                let position = transform.point(point);
+                let position = point * transform.linear().x_axis.x + transform.translation();
                 let error = if precision == Precision::Robust && !guards.contains(Guards::OFFSET) {
                     CONSTANT_OFFSET
                 } else {
@@ -53,8 +53,18 @@ impl Scene {
     }
 }
 
+/// Of a smaller sine (squared) of its sharpest angle the area has to be computed with care.
+const SLIVER: f64 = 1.0 / (1u64 << 40) as f64;
+
+/// Of two numbers; `f64::max` would take care of NaN.
+#[inline(always)]
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
 /// The point of a triangle with a hit's weights, and its error in each axis together with that of the tests that rays
 /// from there undergo.
+#[inline]
 fn on_triangle(v: [DVec3; 3], hit: &Hit, precision: Precision) -> (DVec3, DVec3) {
     let (e1, e2) = (v[1] - v[0], v[2] - v[0]);
     let point = v[0] + e1 * f64::from(hit.u) + e2 * f64::from(hit.v);
@@ -65,10 +75,16 @@ fn on_triangle(v: [DVec3; 3], hit: &Hit, precision: Precision) -> (DVec3, DVec3)
         // The test's distance comes from the plane in f64, whose normal tilts by some roundings times the aspect.
         Precision::Robust | Precision::Double | Precision::Exact => {
             let e3 = e2 - e1;
-            let longest = e1.length_squared().max(e2.length_squared()).max(e3.length_squared()).sqrt();
-            let area = triangle::area_vector(v).length();
-            let tilt = if area > 0.0 { longest * longest / area } else { 1.0 };
-            magnitude * gamma(8) + DVec3::splat(longest * tilt * gamma(8))
+            let (l1, l2, l3) = (e1.length_squared(), e2.length_squared(), e3.length_squared());
+            let longest2 = larger(larger(l1, l2), l3);
+            // Of any two edges where that is good enough for the ninth rounding.
+            let mut area2 = e1.cross(e2).length_squared();
+            if !(area2 > SLIVER * (longest2 * longest2)) {
+                area2 = triangle::area_vector(v).length_squared();
+            }
+            // The longest edge times its square over the area.
+            let tilted = if area2 > 0.0 { longest2 * (longest2 / area2).sqrt() } else { longest2.sqrt() };
+            magnitude * gamma(8) + DVec3::splat(tilted * gamma(9))
         }
     };
     (point, error)

@@ -20,6 +20,8 @@ pub(crate) trait Kernel: Copy + fmt::Debug + Send + Sync + 'static {
     const THROUGH: bool;
     /// Materials may have something laid over their base: then `THROUGH` holds as well.
     const LAYERS: bool;
+    /// There may be fog, things that move, or a camera with a lens.
+    const RARE: bool;
     /// Room for the lobes of a surface.
     type Lobes: Copy + fmt::Debug + AsRef<[Lobe]> + AsMut<[Lobe]>;
     /// No lobes.
@@ -30,7 +32,7 @@ pub(crate) trait Kernel: Copy + fmt::Debug + Send + Sync + 'static {
 pub(crate) const MAX_LOBES: usize = if cfg!(feature = "without-layers") { 3 } else { 6 };
 
 macro_rules! kernels {
-    ($($(#[$doc:meta])* $name:ident: $textures:literal, $filtered:literal, $through:literal, $layers:literal, $lobes:expr;)*) => {$(
+    ($($(#[$doc:meta])* $name:ident: $textures:literal, $filtered:literal, $through:literal, $layers:literal, $rare:literal, $lobes:expr;)*) => {$(
         $(#[$doc])*
         #[derive(Clone, Copy, Debug)]
         pub(crate) struct $name;
@@ -40,26 +42,27 @@ macro_rules! kernels {
             const FILTERED: bool = $filtered;
             const THROUGH: bool = $through;
             const LAYERS: bool = $layers && cfg!(not(feature = "without-layers"));
+            const RARE: bool = $rare;
             type Lobes = [Lobe; $lobes];
             const NO_LOBES: Self::Lobes = [Lobe::Nothing; $lobes];
         }
     )*};
 }
 
-// Textures, filtered, through, layers, most lobes.
+// Textures, filtered, through, layers, rare, most lobes.
 kernels! {
     /// Diffuse surfaces and mirrors of one colour each.
-    Plain: false, false, false, false, 2;
+    Plain: false, false, false, false, false, 2;
     /// With textures.
-    Textured: true, false, false, false, 2;
+    Textured: true, false, false, false, false, 2;
     /// With hits that do not count.
-    Filtered: false, true, false, false, 2;
+    Filtered: false, true, false, false, false, 2;
     /// With textures, and hits that do not count: most glTF files, whose back faces are not there.
-    TexturedFiltered: true, true, false, false, 2;
+    TexturedFiltered: true, true, false, false, false, 2;
     /// With clear sheets and solids too.
-    Clear: true, true, true, false, 3;
+    Clear: true, true, true, false, false, 3;
     /// Everything.
-    Full: true, true, true, true, MAX_LOBES;
+    Full: true, true, true, true, true, MAX_LOBES;
 }
 
 /// Which of the compiled kernels renders a stage.
@@ -82,8 +85,8 @@ pub enum KernelChoice {
 
 impl KernelChoice {
     /// The smallest kernel that does all of this.
-    pub(crate) fn new(textures: bool, filtered: bool, through: bool, layers: bool) -> Self {
-        match (textures, filtered, through, layers) {
+    pub(crate) fn new(textures: bool, filtered: bool, through: bool, layers: bool, rare: bool) -> Self {
+        match (textures, filtered, through, layers || rare) {
             (.., true) => Self::Full,
             (.., true, false) => Self::Clear,
             (true, true, ..) => Self::TexturedFiltered,
@@ -113,13 +116,13 @@ mod tests {
 
     #[test]
     fn the_kernel_chosen_does_all_that_is_asked() {
-        fn does<K: Kernel>() -> [bool; 4] {
-            [K::TEXTURES, K::FILTERED, K::THROUGH, K::LAYERS]
+        fn does<K: Kernel>() -> [bool; 5] {
+            [K::TEXTURES, K::FILTERED, K::THROUGH, K::LAYERS, K::RARE]
         }
-        for bits in 0..16 {
-            let asked = [1, 2, 4, 8].map(|b| bits & b != 0);
-            let [textures, filtered, through, layers] = asked;
-            let done = match KernelChoice::new(textures, filtered, through, layers) {
+        for bits in 0..32 {
+            let asked = [1, 2, 4, 8, 16].map(|b| bits & b != 0);
+            let [textures, filtered, through, layers, rare] = asked;
+            let done = match KernelChoice::new(textures, filtered, through, layers, rare) {
                 KernelChoice::Plain => does::<Plain>(),
                 KernelChoice::Textured => does::<Textured>(),
                 KernelChoice::Filtered => does::<Filtered>(),

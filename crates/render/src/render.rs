@@ -635,7 +635,7 @@ impl<'a> Job<'a> {
         let sampler = PixelSampler::of(self.options.sampler, self.options.seed, (x, y), sample);
         let [dx, dy] = self.filter.offset(tracer.draw2(&sampler, Dimension::Pixel));
         let at = [f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy];
-        let ray = if self.camera.has_lens() {
+        let ray = if K::RARE && self.camera.has_lens() {
             tally::sample(EffectSet::DEPTH_OF_FIELD);
             let on_lens = warp::disk(tracer.draw2(&sampler, Dimension::Lens));
             self.camera.ray_through_lens(at, on_lens.as_dvec2().to_array())
@@ -659,7 +659,8 @@ impl<'a> Job<'a> {
         let mut each = Duration::ZERO;
         shots.hits.clear();
         shots.hits.resize(shots.list.len(), None);
-        let (moves, paths) = (self.stage.moves(), matches!(self.method, Method::Path(_) | Method::Forward(_)));
+        let (moves, paths) =
+            (K::RARE && self.stage.moves(), matches!(self.method, Method::Path(_) | Method::Forward(_)));
         if paths && !moves {
             // Camera rays go the same way: together.
             let timed = shots.list.iter().filter(|s| s.timed).count() as u64;

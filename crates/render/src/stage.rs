@@ -234,6 +234,7 @@ impl Stage {
             effects.intersects(EffectSet::ALPHA_MASK | EffectSet::ALPHA_BLEND) || of_used(&|i| flags[i].asks()),
             effects.intersects(EffectSet::THROUGH) || of_used(&|i| materials[i].goes_through()),
             effects.intersects(EffectSet::LAYERS) || of_used(&|i| materials[i].is_layered()),
+            effects.intersects(EffectSet::FOG | EffectSet::MOTION | EffectSet::DEPTH_OF_FIELD),
         );
         let places: Vec<DAffine3> = scene.instances.iter().map(|i| i.transform).collect();
         let world = World::new(scene, places);

@@ -140,31 +140,33 @@ impl World {
         }
         let front = outward.dot(wo) >= 0.0;
         let geometric = if front { outward } else { -outward };
-        let mut surface = Surface {
+        let instance = &self.instances[hit.id.instance as usize];
+        let part = self.part(hit.id, hit.u, hit.v);
+        let (mut smooth, mut curved) = (geometric, false);
+        if let Some(n) = part.vertex_normal() {
+            let n = instance.normals * n;
+            // Vertex normals that disagree with the winding are turned with it.
+            let n = if n.dot(geometric) < 0.0 { -n } else { n };
+            smooth = n.try_normalize().unwrap_or(geometric);
+            curved = true;
+        }
+        Surface {
             id: hit.id,
-            instance: &self.instances[hit.id.instance as usize],
-            part: self.part(hit.id, hit.u, hit.v),
+            instance,
+            part,
             point,
             front,
             wo,
             geometric,
-            smooth: geometric,
-            curved: false,
+            smooth,
+            curved,
             cone: width,
             width,
             colors: Colors::All(1),
             seen: None,
             dark: false,
             clock: None,
-        };
-        if let Some(n) = surface.vertex_normal() {
-            let n = surface.instance.normals * n;
-            // Vertex normals that disagree with the winding are turned with it.
-            let n = if n.dot(geometric) < 0.0 { -n } else { n };
-            surface.smooth = n.try_normalize().unwrap_or(geometric);
-            surface.curved = true;
         }
-        surface
     }
 }
 
@@ -173,6 +175,19 @@ impl World {
 enum Part<'a> {
     Triangle { mesh: &'a TriangleMesh, corners: [usize; 3], weights: [f32; 3] },
     Shape { uv: Vec2, uv_per_length: f32 },
+}
+
+impl Part<'_> {
+    /// Interpolated vertex normal in the mesh's space, not unit.
+    #[inline]
+    fn vertex_normal(&self) -> Option<Vec3> {
+        match self {
+            Part::Triangle { mesh, corners, weights } if !mesh.normals.is_empty() => {
+                Some((0..3).map(|i| mesh.normals[corners[i]] * weights[i]).sum())
+            }
+            _ => None,
+        }
+    }
 }
 
 /// How textures are looked at.
@@ -316,16 +331,6 @@ impl Surface<'_> {
         }
     }
 
-    /// Interpolated vertex normal in the mesh's space, not unit.
-    fn vertex_normal(&self) -> Option<Vec3> {
-        match self.part {
-            Part::Triangle { mesh, corners, weights } if !mesh.normals.is_empty() => {
-                Some((0..3).map(|i| mesh.normals[corners[i]] * weights[i]).sum())
-            }
-            _ => None,
-        }
-    }
-
     /// Seen from the light, a coarse mesh with smooth normals shadows itself along its edges. Shadow rays therefore
     /// start on the curved surface that the normals mean: Hanika, "Hacking the Shadow Terminator" (Ray Tracing Gems
     /// II, chapter 4). This is the way from the point to there.
@@ -383,7 +388,7 @@ impl Surface<'_> {
                 let t: Vec4 = (0..3).map(|i| mesh.tangents[corners[i]] * weights[i]).sum();
                 let tangent = (self.instance.vectors * t.truncate()).try_normalize()?;
                 // The vertex normal, not turned to the winding: that is what the tangents were made with.
-                let normal = self.instance.normals * self.vertex_normal().unwrap_or(Vec3::ZERO);
+                let normal = self.instance.normals * self.part.vertex_normal().unwrap_or(Vec3::ZERO);
                 let normal = normal.try_normalize().unwrap_or(outward);
                 let mirrored = self.instance.vectors.determinant().signum();
                 Some([tangent, normal.cross(tangent) * (t.w.signum() * mirrored)])

@@ -128,7 +128,9 @@ impl<K: Kernel> Tracer<'_, K> {
         };
         let mut hit = first;
         loop {
-            if let Some(fog) = self.fog.filter(|_| !walk.inside) {
+            if K::RARE
+                && let Some(fog) = self.fog.filter(|_| !walk.inside)
+            {
                 match self.fly(fog, &mut walk, hit.as_ref(), sampler, limits, &mut seen) {
                     Flown::Through => {}
                     Flown::Scattered => {
@@ -467,7 +469,7 @@ impl<K: Kernel> Tracer<'_, K> {
         {
             light *= (at.absorption * -((end - origin).length() as f32)).map(f32::exp);
         }
-        if self.fog.is_some() && (behind || !at.inside) {
+        if K::RARE && self.fog.is_some() && (behind || !at.inside) {
             light *= self.through_fog(origin, sample);
         }
         // What is just below the flat triangle is lit through it.

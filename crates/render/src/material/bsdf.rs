@@ -32,12 +32,11 @@ impl<K: Kernel> Bsdf<K> {
         }
     }
 
-    /// Adds a lobe: at most as many as the kernel has room for.
-    #[inline]
-    pub(crate) fn with(mut self, lobe: Lobe) -> Self {
+    /// Adds a lobe: at most as many as the kernel has room for. In place, since lobes are large.
+    #[inline(always)]
+    pub(crate) fn add(&mut self, lobe: Lobe) {
         self.lobes.as_mut()[self.count] = lobe;
         self.count += 1;
-        self
     }
 
     pub(crate) fn lobes(&self) -> &[Lobe] {

@@ -283,51 +283,50 @@ impl Material {
     /// Everything about the surface at one point.
     pub(crate) fn shade<K: Kernel>(&self, surface: &Surface<'_>) -> Shading<K> {
         let emission = self.emission::<K>(surface);
-        let normal = surface.smooth;
-        let (bsdf, base_color) = match &self.model {
+        let normal = match &self.model {
             Model::Pbr(pbr) => return pbr.shade::<K, false>(surface, self.conventions, emission),
             Model::Layered(pbr) if K::LAYERS => return pbr.shade::<K, true>(surface, self.conventions, emission),
+            Model::Diffuse(_) | Model::Emission(_) | Model::Layered(_) => surface.smooth,
+            _ => self.bent(surface),
+        };
+        let mut shading = Shading { bsdf: Bsdf::new(normal), emission, base_color: Vec3::ZERO };
+        let Shading { bsdf, base_color, .. } = &mut shading;
+        match &self.model {
             Model::Diffuse(albedo) => {
-                (Bsdf::new(normal).with(Lobe::Lambert(Lambert { albedo: *albedo, coat: None })), *albedo)
+                *base_color = *albedo;
+                bsdf.add(Lobe::Lambert(Lambert { albedo: *albedo, coat: None }));
             }
             Model::Mirror(reflectance) => {
-                let lobe = SpecularReflection { fresnel: Fresnel::Constant(*reflectance) };
-                (Bsdf::new(self.bent(surface)).with(Lobe::SpecularReflection(lobe)), *reflectance)
+                *base_color = *reflectance;
+                bsdf.add(Lobe::SpecularReflection(SpecularReflection { fresnel: Fresnel::Constant(*reflectance) }));
             }
             Model::Glass if K::THROUGH => {
+                *base_color = Vec3::ONE;
                 let eta = self.eta(surface);
                 let fresnel = Fresnel::Dielectric { eta };
-                let bsdf = Bsdf::new(self.bent(surface))
-                    .with(Lobe::SpecularReflection(SpecularReflection { fresnel }))
-                    .with(Lobe::SpecularTransmission(SpecularTransmission {
-                        eta,
-                        fresnel,
-                        tint: Vec3::ONE,
-                        scale: self.scaling(eta),
-                    }));
-                (bsdf, Vec3::ONE)
+                bsdf.add(Lobe::SpecularReflection(SpecularReflection { fresnel }));
+                let (tint, scale) = (Vec3::ONE, self.scaling(eta));
+                bsdf.add(Lobe::SpecularTransmission(SpecularTransmission { eta, fresnel, tint, scale }));
             }
             Model::RoughMirror { alpha, reflectance } => {
-                let fresnel = Fresnel::Constant(*reflectance);
-                let lobe = GgxReflection { alpha: *alpha, fresnel, masking: Masking::Correlated, scale: Vec3::ONE };
-                (Bsdf::new(self.bent(surface)).with(Lobe::GgxReflection(lobe)), *reflectance)
+                *base_color = *reflectance;
+                let (alpha, fresnel) = (*alpha, Fresnel::Constant(*reflectance));
+                let lobe = GgxReflection { alpha, fresnel, masking: Masking::Correlated, scale: Vec3::ONE };
+                bsdf.add(Lobe::GgxReflection(lobe));
             }
             Model::RoughGlass { alpha } if K::THROUGH => {
+                *base_color = Vec3::ONE;
                 let eta = self.eta(surface);
                 let (alpha, fresnel) = (*alpha, Fresnel::Dielectric { eta });
-                let transmission = GgxTransmission { alpha, eta, fresnel, tint: Vec3::ONE, scale: self.scaling(eta) };
                 let reflection = GgxReflection { alpha, fresnel, masking: Masking::Separate, scale: Vec3::ONE };
-                let bsdf = Bsdf::new(self.bent(surface))
-                    .with(Lobe::GgxReflection(reflection))
-                    .with(Lobe::GgxTransmission(transmission));
-                (bsdf, Vec3::ONE)
+                bsdf.add(Lobe::GgxReflection(reflection));
+                let (tint, scale) = (Vec3::ONE, self.scaling(eta));
+                bsdf.add(Lobe::GgxTransmission(GgxTransmission { alpha, eta, fresnel, tint, scale }));
             }
-            // The last three are met by kernels that can do them alone.
-            Model::Emission(_) | Model::Layered(_) | Model::Glass | Model::RoughGlass { .. } => {
-                (Bsdf::new(normal), Vec3::ZERO)
-            }
-        };
-        Shading { bsdf, emission, base_color }
+            // All but what glows is met by kernels that can do it alone.
+            Model::Emission(_) | Model::Pbr(_) | Model::Layered(_) | Model::Glass | Model::RoughGlass { .. } => {}
+        }
+        shading
     }
 
     fn bent(&self, surface: &Surface<'_>) -> Vec3 {

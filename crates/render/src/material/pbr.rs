@@ -356,11 +356,11 @@ impl Pbr {
             through = Some(lobe).filter(|l| l.color.max_element() > 0.0).map(Lobe::DiffuseTransmission);
         }
         if diffuse.max_element() > 0.0 {
-            bsdf = bsdf.with(Lobe::Lambert(Lambert { albedo: diffuse, coat: Some(coat) }));
+            bsdf.add(Lobe::Lambert(Lambert { albedo: diffuse, coat: Some(coat) }));
         }
         if fresnel.reflectance(0.0).max_element() > 0.0 || fresnel.reflectance(1.0).max_element() > 0.0 {
             let scale = compensation * below;
-            bsdf = bsdf.with(match &brush {
+            bsdf.add(match &brush {
                 Some(brush) => {
                     let along = alpha + (1.0 - alpha) * brush.strength * brush.strength;
                     Lobe::AnisotropicGgx(AnisotropicGgx { alpha: glam::Vec2::new(along, alpha), fresnel, scale })
@@ -374,7 +374,7 @@ impl Pbr {
             if !smooth {
                 tint *= compensation_through;
             }
-            bsdf = bsdf.with(if (eta - 1.0).abs() > 1e-3 {
+            bsdf.add(if (eta - 1.0).abs() > 1e-3 {
                 // KHR_materials_transmission leaves open how the index changes roughness; microfacets say it.
                 if smooth {
                     Lobe::SpecularTransmission(SpecularTransmission { eta, fresnel, tint, scale: 1.0 })
@@ -388,7 +388,7 @@ impl Pbr {
             });
         }
         for lobe in [through, fibres, over].into_iter().flatten() {
-            bsdf = bsdf.with(lobe);
+            bsdf.add(lobe);
         }
         Shading { bsdf, emission, base_color: base }
     }
