@@ -171,6 +171,13 @@ fn decode_common(bytes: &[u8], limits: &Limits) -> Result<(u32, u32, Pixels), Er
         | DynamicImage::ImageLumaA16(_)
         | DynamicImage::ImageRgb16(_)
         | DynamicImage::ImageRgba16(_) => Pixels::Rgba16(bytemuck::cast_slice(&image.into_rgba16()).into()),
+        // What most images are, without a copy between.
+        DynamicImage::ImageRgb8(image) => {
+            Pixels::Rgba8(image.as_raw().chunks_exact(3).map(|p| [p[0], p[1], p[2], u8::MAX]).collect())
+        }
+        DynamicImage::ImageLuma8(image) => {
+            Pixels::Rgba8(image.as_raw().iter().map(|&grey| [grey, grey, grey, u8::MAX]).collect())
+        }
         _ => Pixels::Rgba8(bytemuck::cast_slice(&image.into_rgba8()).into()),
     };
     Ok((width, height, pixels))

@@ -136,6 +136,8 @@ impl Rendered {
 const MOST_BOUNCES: u32 = 1024;
 /// Rows of a band, the unit of work of a thread.
 const BAND: u32 = 4;
+/// Columns of a band between two looks at the clock and at what the monitor wants.
+const STRIP: u32 = 64;
 /// Of so many pixels one is timed; with [`RenderOptions::profile`] more.
 const TIMED: u32 = 61;
 const PROFILED: u32 = 7;
@@ -580,38 +582,42 @@ impl<'a> Job<'a> {
         let mut shots = Shots::default();
         // What was done before on this thread is of others.
         let _ = Tally::take();
-        for y in band.rows() {
+        // Pixels beside and below each other go together: they see the same part of the tree and the same texels.
+        let (columns, rows) = (band.columns(), band.rows());
+        for left in columns.clone().step_by(STRIP as usize) {
             done.late = self.is_late(samples.start);
-            // A row at least is done between two checkpoints, however often they are wanted.
+            // A strip at least is done between two checkpoints, however often they are wanted.
             done.paused = done.samples > 0 && monitor.wants_checkpoint();
             if done.late || done.paused || monitor.cancelled() {
                 break;
             }
-            for x in band.columns() {
-                if !tiles.is_active(x, y) {
-                    continue;
-                }
-                // What a pixel has it need not get again.
-                let from = self.options.first_sample + band.pixel(x, y)[0].count();
-                let samples = samples.start.max(from)..samples.end;
-                if self.empty.as_ref().is_some_and(|empty| empty.at(x, y)) {
-                    done.samples += u64::from(samples.end.saturating_sub(samples.start));
-                    done.bad += self.behind(tracer, band.pixel(x, y), (x, y), samples, splats);
-                    continue;
-                }
-                let profiled = self.options.profile && matches!(self.method, Method::Path(_));
-                let place = x.wrapping_mul(31).wrapping_add(y.wrapping_mul(17));
-                let timed = place.is_multiple_of(if profiled { PROFILED } else { TIMED });
-                tracer.clock = Some(clock).filter(|_| profiled && timed);
-                for sample in samples {
-                    let started = tracer.clock.map(|_| Instant::now());
-                    let (shot, ray) = self.shot(tracer, (x, y), sample, timed);
-                    let begun = started.map(|s| s.elapsed());
-                    shots.push(Shot { begun, ..shot }, ray);
-                    if shots.are_many() {
-                        done.bad += self.shoot(tracer, clock, band, &mut shots, splats);
+            for x in left..left.saturating_add(STRIP).min(columns.end) {
+                for y in rows.clone() {
+                    if !tiles.is_active(x, y) {
+                        continue;
                     }
-                    done.samples += 1;
+                    // What a pixel has it need not get again.
+                    let from = self.options.first_sample + band.pixel(x, y)[0].count();
+                    let samples = samples.start.max(from)..samples.end;
+                    if self.empty.as_ref().is_some_and(|empty| empty.at(x, y)) {
+                        done.samples += u64::from(samples.end.saturating_sub(samples.start));
+                        done.bad += self.behind(tracer, band.pixel(x, y), (x, y), samples, splats);
+                        continue;
+                    }
+                    let profiled = self.options.profile && matches!(self.method, Method::Path(_));
+                    let place = x.wrapping_mul(31).wrapping_add(y.wrapping_mul(17));
+                    let timed = place.is_multiple_of(if profiled { PROFILED } else { TIMED });
+                    tracer.clock = Some(clock).filter(|_| profiled && timed);
+                    for sample in samples {
+                        let started = tracer.clock.map(|_| Instant::now());
+                        let (shot, ray) = self.shot(tracer, (x, y), sample, timed);
+                        let begun = started.map(|s| s.elapsed());
+                        shots.push(Shot { begun, ..shot }, ray);
+                        if shots.are_many() {
+                            done.bad += self.shoot(tracer, clock, band, &mut shots, splats);
+                        }
+                        done.samples += 1;
+                    }
                 }
             }
         }
