@@ -135,6 +135,31 @@ fn rough_glass_keeps_all_light() {
     }
 }
 
+/// As Khronos' TransmissionRoughnessTest says: facets of an index of 1 change no direction, and reflect nothing.
+#[test]
+fn rough_air_is_as_clear_as_air() {
+    let air = |thickness, specular| {
+        matt(0.5, |m| {
+            (m.transmission, m.thickness, m.ior) = (1.0, thickness, 1.0);
+            (m.roughness, m.specular) = (0.9, specular);
+        })
+    };
+    for (material, passed) in [(air(1.0, 1.0), 0.25), (air(0.0, 0.0), 0.25)] {
+        let mut scene = scene_of(&[material, glow(1.0)]);
+        quad(&mut scene, DVec3::new(-9.0, 2.0, 9.0), DVec3::X * 18.0, DVec3::Z * -18.0, 0);
+        quad(&mut scene, DVec3::new(-9.0, 1.0, 9.0), DVec3::Z * -18.0, DVec3::X * 18.0, 0);
+        // Light on the left alone: what is blurred would mix both.
+        quad(&mut scene, DVec3::new(-9.0, 0.0, 9.0), DVec3::X * 9.0, DVec3::Z * -18.0, 1);
+        for integrator in [IntegratorChoice::Path, IntegratorChoice::Whitted] {
+            for eye in [DVec3::new(0.3, 5.0, 0.2), DVec3::new(-0.2, 2.5, 8.0)] {
+                let look = |x| Probe::new(&scene).integrator(integrator).from(eye).look(DVec3::new(x, 0.0, 0.1)).x;
+                assert_near(look(-0.1), passed, 1e-4);
+                assert_near(look(0.1), 0.0, 1e-4);
+            }
+        }
+    }
+}
+
 #[test]
 fn light_from_behind_comes_through_diffusely() {
     let through = |factor| {

@@ -245,7 +245,22 @@ impl Pbr {
 
     pub(super) fn is_smooth<K: Kernel>(&self, surface: &Surface<'_>) -> bool {
         let roughness = self.roughness * scalar::<K>(self.roughness_texture.as_ref(), surface);
-        roughness * roughness <= LEAST_ALPHA
+        let blurring = roughness * self.blur();
+        blurring * blurring <= LEAST_ALPHA
+    }
+
+    /// The share of its roughness that blurs what is seen through it. Facets of an index of 1 bend nothing, so those of a
+    /// solid blur nothing either; of a sheet they blur by how far its index is from 1, up to that of glass.
+    fn blur(&self) -> f32 {
+        match self.is_solid() {
+            true => f32::from(u8::from(self.bends())),
+            false => (2.0 * (self.ior - 1.0).abs()).min(1.0),
+        }
+    }
+
+    /// Whether its index of refraction is another than that of air.
+    fn bends(&self) -> bool {
+        (self.ior - 1.0).abs() > 1e-3
     }
 
     /// What it sends to the viewer by itself: of what glows below a coat, what that lets out.
@@ -285,7 +300,9 @@ impl Pbr {
         let specular = self.specular * scalar::<K>(self.specular_texture.as_ref(), surface);
         let tint = self.specular_color * color::<K>(self.specular_color_texture.as_ref(), surface).xyz();
         let f0 = (tint * normal_incidence(self.ior)).min(Vec3::ONE) * specular;
-        Fresnel::Schlick { f0: f0.lerp(base, metallic), f90: specular + (1.0 - specular) * metallic, eta }
+        // Between the same on both sides there is no boundary, which Schlick's formula does not know.
+        let grazing = if K::THROUGH && self.is_solid() && !self.bends() { 0.0 } else { specular };
+        Fresnel::Schlick { f0: f0.lerp(base, metallic), f90: grazing + (1.0 - grazing) * metallic, eta }
     }
 
     /// `LAYERS`: whether what is laid over the base is looked at. Materials that have nothing there are shaded by code
@@ -311,6 +328,7 @@ impl Pbr {
             false => 0.0,
         };
         let alpha = (roughness * roughness).max(LEAST_ALPHA);
+        let blurring = if K::THROUGH { roughness * self.blur() } else { roughness };
         let (eta, parted) = if K::THROUGH { self.boundary(surface) } else { (1.0, Vec3::ONE) };
         let cos = normal.dot(surface.wo);
 
@@ -322,11 +340,15 @@ impl Pbr {
         if let (true, Fresnel::Schlick { f0, .. }) = (conventions.energy_compensation, bare) {
             compensation = energy::compensation(cos, roughness, f0);
             if K::THROUGH && transmission > 0.0 {
-                compensation_through = match &self.boundary {
-                    Some(boundary) => boundary.compensation(cos, roughness, surface.front),
-                    None => energy::thin_compensation(cos, roughness),
+                let reflected;
+                (reflected, compensation_through) = match &self.boundary {
+                    Some(boundary) => {
+                        let both = boundary.compensation(cos, roughness, surface.front);
+                        (both, both)
+                    }
+                    None => (energy::thin_compensation(cos, roughness), energy::thin_compensation(cos, blurring)),
                 };
-                compensation = compensation.lerp(Vec3::splat(compensation_through), transmission * (1.0 - metallic));
+                compensation = compensation.lerp(Vec3::splat(reflected), transmission * (1.0 - metallic));
             }
         }
         let brush = layers.and_then(|l| l.brush::<K>(surface));
@@ -370,12 +392,12 @@ impl Pbr {
         }
         let mut tint = base * ((1.0 - metallic) * transmission * below) * parted;
         if K::THROUGH && tint.max_element() > 0.0 {
-            let smooth = alpha <= LEAST_ALPHA;
+            let blurring = (blurring * blurring).max(LEAST_ALPHA);
+            let smooth = blurring <= LEAST_ALPHA;
             if !smooth {
                 tint *= compensation_through;
             }
             bsdf.add(if (eta - 1.0).abs() > 1e-3 {
-                // KHR_materials_transmission leaves open how the index changes roughness; microfacets say it.
                 if smooth {
                     Lobe::SpecularTransmission(SpecularTransmission { eta, fresnel, tint, scale: 1.0 })
                 } else {
@@ -384,7 +406,7 @@ impl Pbr {
             } else if smooth {
                 Lobe::SpecularTransmission(SpecularTransmission { eta: 1.0, fresnel, tint, scale: 1.0 })
             } else {
-                Lobe::ThinTransmission(ThinTransmission { alpha, fresnel, tint })
+                Lobe::ThinTransmission(ThinTransmission { alpha: blurring, fresnel, tint })
             });
         }
         for lobe in [through, fibres, over].into_iter().flatten() {
