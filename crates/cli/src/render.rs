@@ -73,8 +73,12 @@ impl Job<'_> {
 
         let started = Instant::now();
         self.console.detail(format_args!("reading {}", args.model.display()));
-        let options =
-            firsthit_import::Options { up: args.scene.up, variant: args.scene.variant.clone(), ..Default::default() };
+        let options = firsthit_import::Options {
+            up: args.scene.up,
+            variant: args.scene.variant.clone(),
+            without_occlusion: true,
+            ..Default::default()
+        };
         let Imported { scene, report } = firsthit_import::open(&args.model, &options)?;
         self.console.warnings(&report, args.run.strict)?;
         self.spare_what_was_read(&report)?;

@@ -75,6 +75,9 @@ pub struct Options {
     pub up: Option<UpAxis>,
     /// The variant of materials to show, by name or number (glTF's KHR_materials_variants). `None`: the file's default.
     pub variant: Option<String>,
+    /// Leave the images out that nothing but occlusion textures show, which a ray tracer has no use for: a white pixel
+    /// stands for each (glTF alone).
+    pub without_occlusion: bool,
     /// Limits against hostile files.
     pub limits: Limits,
 }

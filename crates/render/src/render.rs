@@ -136,8 +136,8 @@ impl Rendered {
 const MOST_BOUNCES: u32 = 1024;
 /// Rows of a band, the unit of work of a thread.
 const BAND: u32 = 4;
-/// Columns of a band between two looks at the clock and at what the monitor wants.
-const STRIP: u32 = 64;
+/// Columns of a band between two looks at the clock and at what the monitor wants: fewer pixels than a row has.
+const STRIP: u32 = 8;
 /// Of so many pixels one is timed; with [`RenderOptions::profile`] more.
 const TIMED: u32 = 61;
 const PROFILED: u32 = 7;

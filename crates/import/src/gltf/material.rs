@@ -12,7 +12,7 @@ use super::texture::{Info, Textures};
 use crate::scene::{AlphaMode, Channel, MaterialDesc, MaterialModel, PbrMaterial, TextureRef};
 use crate::{ImportError, Report};
 
-/// Reads all materials.
+/// Reads all materials, with the images of occlusion textures or without.
 ///
 /// # Errors
 /// If one refers to a texture that does not exist.
@@ -20,12 +20,18 @@ pub(super) fn read<'a>(
     source: &'a Source<'a>,
     textures: &mut Textures<'a>,
     report: &mut Report,
+    occlusion: bool,
 ) -> Result<Vec<MaterialDesc>, ImportError> {
     let materials = source.root.materials.iter().enumerate();
     materials
         .map(|(i, json)| {
-            let mut reader =
-                Reader { source, textures: &mut *textures, report: &mut *report, place: format!("/materials/{i}") };
+            let mut reader = Reader {
+                source,
+                textures: &mut *textures,
+                report: &mut *report,
+                occlusion,
+                place: format!("/materials/{i}"),
+            };
             let model = MaterialModel::Pbr(Box::new(reader.material(json)?));
             Ok(MaterialDesc { name: json.name.clone().unwrap_or_else(|| format!("material {i}")), model })
         })
@@ -49,6 +55,8 @@ pub(super) struct Reader<'a, 'b> {
     pub(super) source: &'a Source<'b>,
     textures: &'a mut Textures<'b>,
     report: &'a mut Report,
+    /// Occlusion textures are to be decoded.
+    occlusion: bool,
     pub(super) place: String,
 }
 
@@ -178,7 +186,8 @@ impl Reader<'_, '_> {
     }
 
     pub(super) fn info(&mut self, key: &str, info: Info<'_>, channel: Channel) -> Result<TextureRef, ImportError> {
-        self.textures.reference(info, channel, &format!("{}/{key}", self.place))
+        let wanted = key != "occlusionTexture" || self.occlusion;
+        self.textures.reference(info, channel, wanted, &format!("{}/{key}", self.place))
     }
 
     /// A factor from 0 to 1.

@@ -96,7 +96,7 @@ pub(crate) fn read_bytes(bytes: &[u8], path: &Path, options: &Options) -> Result
     let name = name.or_else(|| path.file_stem().map(|s| s.to_string_lossy().into_owned())).unwrap_or_default();
     let mut scene = SceneDesc { name, ..SceneDesc::default() };
     let mut textures = Textures::new(&source);
-    scene.materials = material::read(&source, &mut textures, &mut report)?;
+    scene.materials = material::read(&source, &mut textures, &mut report, !options.without_occlusion)?;
     instance::place(&source, &nodes, variant, &mut scene, &mut report)?;
     for &node in &nodes.shown {
         let world = &nodes.world[node];

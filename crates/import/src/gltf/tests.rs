@@ -8,6 +8,10 @@ use crate::{ErrorKind, ImportError, Imported, Limits, Options};
 
 /// Reads a file beside images that are hard to compress.
 fn read(document: &Value, limits: Limits) -> Result<Imported, ImportError> {
+    read_with(document, &Options { limits, ..Options::default() })
+}
+
+fn read_with(document: &Value, options: &Options) -> Result<Imported, ImportError> {
     let dir = tempfile::tempdir().expect("temporary folder");
     for (k, name) in ["a.png", "b.png", "c.png"].into_iter().enumerate() {
         let noise =
@@ -16,7 +20,7 @@ fn read(document: &Value, limits: Limits) -> Result<Imported, ImportError> {
     }
     let path = dir.path().join("made.gltf");
     fs::write(&path, document.to_string()).expect("file");
-    super::read(&path, &Options { limits, up: None, variant: None })
+    super::read(&path, options)
 }
 
 #[test]
@@ -98,4 +102,21 @@ fn what_lies_out_of_all_range_is_left_out() {
     let read = read(&file, Limits::default()).expect("readable");
     assert!(read.scene.instances.is_empty() && read.scene.meshes.is_empty());
     assert_eq!(read.report.warnings.last().map(|w| w.place.as_str()), Some("/nodes/1"));
+}
+
+#[test]
+fn images_of_occlusion_alone_are_left_out_where_that_is_asked() {
+    let file = json!({
+        "asset": {"version": "2.0"},
+        "images": [{"uri": "a.png"}, {"uri": "b.png"}],
+        "textures": [{"source": 0}, {"source": 1}],
+        "materials": [{
+            "pbrMetallicRoughness": {"metallicRoughnessTexture": {"index": 0}},
+            "occlusionTexture": {"index": 1},
+        }, {"occlusionTexture": {"index": 0}}],
+    });
+    for (without_occlusion, widths) in [(false, [24, 24]), (true, [24, 1])] {
+        let scene = read_with(&file, &Options { without_occlusion, ..Options::default() }).expect("readable").scene;
+        assert_eq!(scene.images.iter().map(|i| i.width).collect::<Vec<_>>(), widths);
+    }
 }

@@ -23,6 +23,8 @@ pub(super) struct Textures<'a> {
     same: Vec<usize>,
     numbers: BTreeMap<Shown, usize>,
     used: Vec<Shown>,
+    /// For each of them whether it has to be decoded.
+    wanted: Vec<bool>,
 }
 
 /// What a texture shows, by numbers in the file.
@@ -57,10 +59,10 @@ impl<'a> Textures<'a> {
         let images = source.root.images.iter().enumerate();
         let same = images
             .map(|(i, image)| *first.entry((image.uri.as_deref(), image.buffer_view.map(|v| v.value()))).or_insert(i));
-        Self { source, same: same.collect(), numbers: BTreeMap::new(), used: Vec::new() }
+        Self { source, same: same.collect(), numbers: BTreeMap::new(), used: Vec::new(), wanted: Vec::new() }
     }
 
-    /// The reference to a texture; `place` is that of the reference in the file.
+    /// The reference to a texture; `place` is that of the reference in the file. What is `wanted` nowhere is not decoded.
     ///
     /// # Errors
     /// If the texture does not exist or its transform is no such thing.
@@ -68,6 +70,7 @@ impl<'a> Textures<'a> {
         &mut self,
         info: Info<'_>,
         channel: Channel,
+        wanted: bool,
         place: &str,
     ) -> Result<TextureRef, ImportError> {
         let root = self.source.root;
@@ -84,8 +87,10 @@ impl<'a> Textures<'a> {
         let next = self.used.len();
         let image = *self.numbers.entry(shown).or_insert_with(|| {
             self.used.push(shown);
+            self.wanted.push(false);
             next
         });
+        self.wanted[image] |= wanted;
         let transform = match (info.transform, info.others.and_then(|o| o.get("KHR_texture_transform"))) {
             (None, Some(value)) => {
                 let place = format!("{place}/extensions/KHR_texture_transform");
@@ -111,7 +116,7 @@ impl<'a> Textures<'a> {
         let mut encoded = Vec::new();
         // Encoded images are held all at once.
         let mut left = *self.source.limits;
-        for (k, &shown) in self.used.iter().enumerate() {
+        for (k, &shown) in self.used.iter().enumerate().filter(|(k, _)| self.wanted[*k]) {
             let bytes = match shown {
                 Shown::Image(index) => self.bytes(index, &left, report),
                 Shown::Nothing { texture } => {
