@@ -11,8 +11,7 @@ trap 'rm -rf "$work"' EXIT
 # By Whitted's method, 16 samples where nothing else is said.
 render() { target/release/firsthit render --integrator whitted --max-depth 8 "$@" --quiet; }
 
-# The picture of the README, and those of the lecture.
-render assets/flight-helmet/FlightHelmet.gltf -s 64 --resolution 960x540 -o $out/flight-helmet.png
+# The pictures of the lecture; docs/gallery/make.sh makes those of the README and of docs/gallery.md.
 render assets/scenes/whitted.toml -s 64 --resolution 960x540 -o $out/whitted.png
 render assets/scenes/layers.toml -s 64 --resolution 720x405 -o $out/layers.png
 small=(--resolution 480x270 -s 64)
