@@ -187,20 +187,20 @@ proptest! {
         let (eye, target) = (world(from.normalize_or(DVec3::X) * 10.0), world(to));
         let ray = Ray::<f64>::new(eye, target - eye);
         let Some(hit) = scene.closest_hit(&ray) else { return Ok(()) };
-        prop_assert!(hit.normal.dot(ray.direction) <= 0.0, "from outside, the front is met first");
+        prop_assert!(hit.normal().dot(ray.direction) <= 0.0, "from outside, the front is met first");
         // At an apex there is no side to leave to.
-        prop_assume!(hit.normal != DVec3::ZERO && away.length() > 0.01);
+        prop_assume!(hit.normal() != DVec3::ZERO && away.length() > 0.01);
 
         let point = scene.surface_point(&ray, &hit);
-        let outward = if away.dot(hit.normal) < 0.0 { -away } else { away };
+        let outward = if away.dot(hit.normal()) < 0.0 { -away } else { away };
         let leaving = Ray::<f64>::new(point.spawn(outward), outward);
         prop_assert_eq!(scene.closest_hit(&leaving).map(|h| h.t), None);
 
         // Straight on through the solid, unless only an edge was grazed.
-        if hit.normal.dot(ray.direction.normalize()) < -0.01 {
+        if hit.normal().dot(ray.direction.normalize()) < -0.01 {
             let inner = Ray::<f64>::new(point.spawn(ray.direction), ray.direction);
             if let Some(exit) = scene.closest_hit(&inner) {
-                prop_assert!(exit.normal.dot(ray.direction) >= 0.0, "hit the front again at {}", exit.t);
+                prop_assert!(exit.normal().dot(ray.direction) >= 0.0, "hit the front again at {}", exit.t);
             }
         }
     }

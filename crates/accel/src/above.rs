@@ -16,7 +16,7 @@ use crate::local::{Extent, LocalRay};
 use crate::simd::{self, Available, Lanes, Stack, Work};
 use crate::stats::Probe;
 use crate::traverse::traverse;
-use crate::wide::{BoxSetup, Boxes};
+use crate::wide::Boxes;
 use crate::{BuildOptions, Layout};
 
 /// A tree over boxes in the world.
@@ -272,7 +272,7 @@ impl Work for Walk<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self) -> ControlFlow<()> {
         let Self { wide, ray, delta, asked, reversed, prunes, leaf, boxes } = self;
-        let test = Boxes::<L>::new(&BoxSetup::new::<L>(ray.origin32, ray.direction32, delta));
+        let test = Boxes::<L>::of(ray.origin32, ray.direction32, delta);
         let t_min = L::splat(ray.box_t_min(asked.t_min));
         let mut t_max = ray.box_t_max(asked.t_max);
         let mut stack = Stack::<u64>::new();

@@ -24,9 +24,19 @@ pub struct Hit {
     pub u: f32,
     /// Weight of the triangle's third vertex; a shape's own second parameter.
     pub v: f32,
-    /// Unit geometric normal in the world, by the winding of the triangle; never flipped towards the ray. Zero where
-    /// there is none (the apex of a cone).
-    pub normal: DVec3,
+    /// The geometric normal in the world, by the winding of the triangle, of any length; never flipped towards the ray. Zero
+    /// where there is none (the apex of a cone). [`Hit::normal`] makes it unit, which not every query pays for.
+    pub normal_direction: DVec3,
+}
+
+impl Hit {
+    /// Unit geometric normal in the world, by the winding of the triangle; never flipped towards the ray. Zero where there is
+    /// none.
+    #[inline]
+    #[must_use]
+    pub fn normal(&self) -> DVec3 {
+        self.normal_direction.normalize_or_zero()
+    }
 }
 
 /// A point on a surface, known to within an error bound: what rays start from.

@@ -11,9 +11,9 @@ use glam::{DVec3, Vec3};
 
 use crate::Guards;
 use crate::guards::{AllGuards, GuardSet};
-use crate::local::LocalRay;
+use crate::local::{Line, LocalRay};
 use crate::simd::Lanes;
-use crate::wide::{Either, Filter, Margin, Plain, Sheared};
+use crate::wide::{Either, Filter, Margin, Plain, Sheared, in_lanes};
 
 // Written out: `map` on arrays is not always inlined.
 
@@ -35,7 +35,7 @@ pub(crate) struct Found {
     pub(crate) v: f32,
     /// By winding, of any length.
     pub(crate) normal: DVec3,
-    /// The hit may lie outside the triangle's box as the boxes' test sees it: see [`LocalRay::within_box`].
+    /// The hit may lie outside the triangle's box as the boxes' test sees it: see [`Line::within_box`].
     pub(crate) grazing: bool,
     /// `f64` could not decide.
     pub(crate) fallback: bool,
@@ -43,8 +43,8 @@ pub(crate) struct Found {
 
 /// Where the ray meets the plane of a triangle.
 pub(crate) struct Plane {
-    t: f64,
-    normal: DVec3,
+    pub(crate) t: f64,
+    pub(crate) normal: DVec3,
     grazing: bool,
 }
 
@@ -82,34 +82,54 @@ const LEAST: f64 = 1.0 / 32.0;
 /// tilts the plane, about that vertex, by a few roundings over the sine between the edges: `t` is off by that times the
 /// triangle's length. So no more is lost if `t` times the sine is larger than the span times `loss`.
 #[inline(always)]
-pub(crate) fn plane(vertices: &[Vec3; 3], ray: &LocalRay, loss: f64, from: f64) -> Option<Plane> {
+pub(crate) fn plane(vertices: &[Vec3; 3], line: &Line, loss: f64, from: f64) -> Option<Plane> {
+    match short_plane(vertices, line, loss, from) {
+        Short::Met(plane) => Some(plane),
+        Short::Before => None,
+        Short::Grazed => careful_plane(*vertices, *line, true),
+        Short::Lost => careful_plane(*vertices, *line, false),
+    }
+}
+
+/// What the shortest way to a triangle's plane leads to.
+pub(crate) enum Short {
+    /// No more is lost than is allowed.
+    Met(Plane),
+    /// `t` lies before the interval for certain.
+    Before,
+    /// The ray grazes the plane, or the triangle is a sliver.
+    Grazed,
+    /// Too many digits are lost.
+    Lost,
+}
+
+/// See [`plane`].
+#[inline(always)]
+pub(crate) fn short_plane(vertices: &[Vec3; 3], line: &Line, loss: f64, from: f64) -> Short {
     let [a, b, c] = double(vertices);
-    let (e1, e2, r) = (b - a, c - a, a - ray.origin);
+    let (e1, e2, r) = (b - a, c - a, a - line.origin);
     let normal = e1.cross(e2);
-    let along = normal.dot(ray.direction);
+    let along = normal.dot(line.direction);
     let t = normal.dot(r) / along;
-    let (nn, dd) = (normal.length_squared(), ray.length_squared);
+    let (nn, dd) = (normal.length_squared(), line.length_squared);
     let edges = e1.length_squared() * e2.length_squared();
     if !(nn > SLIVER * edges && along * along > STEEP * (nn * dd)) {
-        return careful_plane(*vertices, *ray, true);
+        return Short::Grazed;
     }
-    let least = loss * ray.span;
+    let least = loss * line.span;
     if nn * (t * t) > edges * (least * least) {
-        return Some(Plane { t, normal, grazing: false });
+        return Short::Met(Plane { t, normal, grazing: false });
     }
     // Nearly every ray that starts on a surface meets the triangle that it comes from here. What lies before
     // the interval by more than any of this may be off (2^-27 of the span, by the thinnest triangle) is not wanted.
-    if t < from - ray.span * (1.0 / (1u64 << 26) as f64) {
-        return None;
-    }
-    careful_plane(*vertices, *ray, false)
+    if t < from - line.span * (1.0 / (1u64 << 26) as f64) { Short::Before } else { Short::Lost }
 }
 
 /// The same with all digits. By value: what is passed by reference has to be kept in memory by the caller, always.
 #[inline(never)]
-fn careful_plane(vertices: [Vec3; 3], ray: LocalRay, grazing: bool) -> Option<Plane> {
+pub(crate) fn careful_plane(vertices: [Vec3; 3], line: Line, grazing: bool) -> Option<Plane> {
     let vertices = double(&vertices);
-    let t = triangle::plane_parameter(vertices, ray.origin, ray.direction)?;
+    let t = triangle::plane_parameter(vertices, line.origin, line.direction)?;
     Some(Plane { t, normal: triangle::area_vector(vertices), grazing })
 }
 
@@ -117,8 +137,6 @@ fn careful_plane(vertices: [Vec3; 3], ray: LocalRay, grazing: bool) -> Option<Pl
 pub(crate) trait Kernel {
     /// Boxes of instances are met as if larger by all that is rounded.
     const PADDED_ABOVE: bool = true;
-    /// Compact trees are traversed by code for closest and any hit alone, as the wide ones are.
-    const DIRECT: bool = false;
     /// What is prepared once per ray and instance.
     type Setup;
     /// Picks from eight triangles those that are worth a test.
@@ -129,7 +147,7 @@ pub(crate) trait Kernel {
     fn padded(_: &Self::Setup) -> bool {
         true
     }
-    /// Hits are kept within their primitive's box: see [`LocalRay::within_box`].
+    /// Hits are kept within their primitive's box: see [`Line::within_box`].
     #[inline(always)]
     fn clamped(_: &Self::Setup) -> bool {
         true
@@ -160,7 +178,6 @@ pub(crate) struct Fast;
 
 impl Kernel for Fast {
     const PADDED_ABOVE: bool = false;
-    const DIRECT: bool = true;
     type Setup = ();
     type Filter<L: Lanes> = Plain<L>;
 
@@ -214,7 +231,6 @@ pub(crate) type Robust = RobustBy<AllGuards>;
 pub(crate) type Guarded = RobustBy<Guards>;
 
 impl<G: GuardSet> Kernel for RobustBy<G> {
-    const DIRECT: bool = true;
     type Setup = (Shear<f32>, G);
     type Filter<L: Lanes> = Either<L, G>;
 
@@ -234,11 +250,11 @@ impl<G: GuardSet> Kernel for RobustBy<G> {
     }
 
     #[inline(always)]
-    fn filter<L: Lanes>((shear, guards): &Self::Setup, ray: &LocalRay) -> Either<L, G> {
+    fn filter<L: Lanes>((_, guards): &Self::Setup, ray: &LocalRay) -> Either<L, G> {
         Either {
             guards: *guards,
             plain: Plain::new(ray.origin32, ray.direction32),
-            sheared: Sheared::new(ray.origin32, ray.direction32, shear, 0.0, slack(ray)),
+            sheared: Sheared::new(in_lanes(ray.origin32), in_lanes(ray.direction32), 0.0, slack(ray)),
         }
     }
 
@@ -249,15 +265,15 @@ impl<G: GuardSet> Kernel for RobustBy<G> {
             if !guards.has(Guards::PLANE_T) {
                 return Some(hit);
             }
-            return Some(plane(vertices, ray, MOST, f64::NEG_INFINITY)?.kept().at(hit.u, hit.v));
+            return Some(plane(vertices, &ray.line(), MOST, f64::NEG_INFINITY)?.kept().at(hit.u, hit.v));
         }
         let relative = relative(vertices, ray.origin32);
         let w = if guards.has(Guards::FALLBACK) { shear.weights(relative) } else { shear.weights_unguarded(relative) }?;
         if guards.has(Guards::PLANE_T | Guards::FALLBACK) {
-            return Some(plane(vertices, ray, MOST, ray.t_min)?.at(w.u, w.v));
+            return Some(plane(vertices, &ray.line(), MOST, ray.t_min)?.at(w.u, w.v));
         }
         if guards.has(Guards::PLANE_T) {
-            return Some(plane(vertices, ray, MOST, f64::NEG_INFINITY)?.kept().at(w.u, w.v));
+            return Some(plane(vertices, &ray.line(), MOST, f64::NEG_INFINITY)?.kept().at(w.u, w.v));
         }
         let t = {
             // The depth of the weighted point along the axis that the ray follows most.
@@ -282,7 +298,7 @@ impl<G: GuardSet> Kernel for RobustBy<G> {
         if setup.1.has(Guards::WATERTIGHT | Guards::FALLBACK | Guards::PLANE_T)
             && let Some(w) = Weights::told::<true>(known)
         {
-            return Some(plane(vertices, ray, MOST, ray.t_min)?.at(w.u, w.v));
+            return Some(plane(vertices, &ray.line(), MOST, ray.t_min)?.at(w.u, w.v));
         }
         Self::test(setup, ray, vertices, t_max)
     }
@@ -294,8 +310,14 @@ impl<G: GuardSet> Kernel for RobustBy<G> {
         }
         let w = setup.0.crosses(relative(vertices, ray.origin32))?;
         Some(
-            crossing(plane(vertices, ray, MOST, f64::NEG_INFINITY), vertices, ray, f64::from(w.u), f64::from(w.v))
-                .at(w.u, w.v),
+            crossing(
+                plane(vertices, &ray.line(), MOST, f64::NEG_INFINITY),
+                vertices,
+                ray,
+                f64::from(w.u),
+                f64::from(w.v),
+            )
+            .at(w.u, w.v),
         )
     }
 }
@@ -317,7 +339,7 @@ fn crossing(plane: Option<Plane>, vertices: &[Vec3; 3], ray: &LocalRay, u: f64, 
 fn margin<L: Lanes>(ray: &LocalRay) -> Margin<L> {
     // A sheared coordinate takes in the errors of two axes; the rest is for the rounding of this line.
     let off = (ray.most_reach() * 2.1) as f32;
-    Margin(Sheared::new(ray.origin32, ray.direction32, &Shear::new(ray.direction32), off, slack(ray)))
+    Margin(Sheared::new(in_lanes(ray.origin32), in_lanes(ray.direction32), off, slack(ray)))
 }
 
 /// How far outside its own depths a triangle may be hit: no farther than boxes are met as if larger, and it is seen with
@@ -348,14 +370,14 @@ impl Kernel for Double {
     fn test(setup: &Shear<f64>, ray: &LocalRay, vertices: &[Vec3; 3], _: f64) -> Option<Found> {
         let [a, b, c] = double(vertices);
         let w = setup.weights([a - ray.origin, b - ray.origin, c - ray.origin])?;
-        Some(plane(vertices, ray, LEAST, ray.t_min)?.at(w.u as f32, w.v as f32))
+        Some(plane(vertices, &ray.line(), LEAST, ray.t_min)?.at(w.u as f32, w.v as f32))
     }
 
     #[inline(always)]
     fn crosses(setup: &Shear<f64>, ray: &LocalRay, vertices: &[Vec3; 3], _: f64) -> Option<Found> {
         let [a, b, c] = double(vertices);
         let w = setup.crosses([a - ray.origin, b - ray.origin, c - ray.origin])?;
-        let plane = crossing(plane(vertices, ray, LEAST, f64::NEG_INFINITY), vertices, ray, w.u, w.v);
+        let plane = crossing(plane(vertices, &ray.line(), LEAST, f64::NEG_INFINITY), vertices, ray, w.u, w.v);
         Some(plane.at(w.u as f32, w.v as f32))
     }
 }
@@ -441,8 +463,8 @@ mod tests {
             let local = Transform::new(DAffine3::IDENTITY).ok().and_then(|m| LocalRay::enter(&line, &m, &object));
             let exact = ExactRay::new(line).and_then(|ray| ray.hit([p, q, r]));
             if let (Some(local), Some(exact)) = (local, exact)
-                && let Some(found) = plane(&corners, &local, MOST, f64::NEG_INFINITY)
-                && careful_plane(corners, local, true).is_none_or(|p| p.t != found.t)
+                && let Some(found) = plane(&corners, &local.line(), MOST, f64::NEG_INFINITY)
+                && careful_plane(corners, local.line(), true).is_none_or(|p| p.t != found.t)
             {
                 let error = (found.t * local.t_unscale / exact.t - 1.0).abs();
                 prop_assert!(error < 2f64.powi(-28), "2^{}", error.log2());

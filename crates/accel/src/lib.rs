@@ -49,6 +49,7 @@ mod refit;
 mod scene;
 #[allow(unsafe_code, reason = "the room for instructions of the processor")]
 mod simd;
+mod single;
 mod stats;
 mod surface_point;
 mod traverse;

@@ -13,7 +13,7 @@
 //! So a triangle that the `f32` test accepts lies within `u|o| + 8uR` of the exact ray ([`LocalRay::reach`]; a little
 //! more where moving the origin was rounded). The hit is where that ray meets the triangle's plane: within eight times
 //! this of the triangle, unless the ray grazes it; then it is moved into the triangle's box
-//! ([`LocalRay::within_box`]). Boxes are met as if they were larger by a little more ([`LocalRay::delta`]), so they
+//! ([`Line::within_box`]). Boxes are met as if they were larger by a little more ([`LocalRay::delta`]), so they
 //! contain every hit: the answer is that of testing all triangles, whatever the tree.
 //!
 //! Setups that not every tier needs (of the box test, of a triangle test) are made by those who need them.
@@ -54,7 +54,7 @@ fn largest(v: DVec3) -> f64 {
 }
 
 /// The bits of an `f64`'s exponent.
-const EXPONENT: u64 = 0x7ff << 52;
+pub(crate) const EXPONENT: u64 = 0x7ff << 52;
 
 fn half_size(bounds: &Aabb<f64>) -> f64 {
     bounds.extent().max_element() * 0.5
@@ -85,6 +85,16 @@ impl Extent {
     pub(crate) fn parts(&self) -> ([f64; 3], f64, f64) {
         (self.center.to_array(), self.magnitude, self.half)
     }
+}
+
+/// See [`LocalRay::most`] and [`LocalRay::delta`].
+#[inline(always)]
+pub(crate) fn delta(farthest: f64, magnitude: f64, off: f64) -> f64 {
+    let most = farthest * (9.1 * U) + (magnitude * (1.1 * U) + off);
+    // Four more u|o|: for rounding the origin, adding this to it, multiplying it with the reciprocal (where the
+    // test does so), and to spare. And four uR for the two roundings of the wide tree's test, which are relative to
+    // the distance.
+    most * 8.0 + (farthest + magnitude) * (12.0 * U) + TINY
 }
 
 /// `t` (local, counted from the true origin) as an end of the box tests' interval, on the side where no box is missed.
@@ -132,7 +142,53 @@ pub(crate) struct LocalRay {
     pub(crate) direction32: Vec3,
 }
 
+/// The line of a ray in an object's normalised space, and what is known of its rounding: what the plane of a triangle is met
+/// by. All as of [`LocalRay`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Line {
+    pub(crate) origin: DVec3,
+    pub(crate) direction: DVec3,
+    pub(crate) length_squared: f64,
+    pub(crate) span: f64,
+    pub(crate) shift: f64,
+    pub(crate) farthest: f64,
+    pub(crate) off: f64,
+}
+
+impl Line {
+    /// The moved origin.
+    #[inline]
+    fn moved(&self) -> DVec3 {
+        self.origin + self.direction * self.shift
+    }
+
+    /// See [`LocalRay::reach`].
+    #[inline]
+    fn reach(&self) -> DVec3 {
+        self.moved().abs() * U + (8.0 * U * self.farthest + self.off)
+    }
+
+    /// Raises `t` (local, counted from the true origin) to where the ray enters the primitive's own box, and lowers it
+    /// to where it leaves: the rule by which a hit never lies before a box that holds it, so that skipping boxes cannot
+    /// change the answer. The box is widened by [`LocalRay::reach`]; `None` when the ray misses even that.
+    #[inline(never)]
+    pub(crate) fn within_box(&self, t: f64, aabb: &Aabb<f64>) -> Option<f64> {
+        let reach = self.reach();
+        let wide = Aabb::new(aabb.min - reach, aabb.max + reach);
+        let slabs = Slabs::new(self.moved(), self.direction);
+        let (enter, leave) = slabs.padded(&wide, f64::NEG_INFINITY, f64::INFINITY);
+        (enter <= leave).then(|| t.min(leave + self.shift).max(enter + self.shift))
+    }
+}
+
 impl LocalRay {
+    /// Its line.
+    #[inline(always)]
+    pub(crate) fn line(&self) -> Line {
+        let Self { origin, direction, length_squared, span, shift, farthest, off, .. } = *self;
+        Line { origin, direction, length_squared, span, shift, farthest, off }
+    }
+
     /// Enters the object. `None` where the ray is not finite there, or its direction shorter or longer than about
     /// 2^-511 or 2^511: numbers that have no room for products.
     #[inline(always)]
@@ -166,10 +222,6 @@ impl LocalRay {
         }
         // The moved origin is no larger than its distance and the centre.
         let most = farthest * (9.1 * U) + (magnitude * (1.1 * U) + off);
-        // Four more u|o|: for rounding the origin, adding this to it, multiplying it with the reciprocal (where the
-        // test does so), and to spare. And four uR for the two roundings of the wide tree's test, which are relative to
-        // the distance.
-        let delta = most * 8.0 + (farthest + magnitude) * (12.0 * U) + TINY;
         Some(Self {
             origin,
             direction,
@@ -180,19 +232,13 @@ impl LocalRay {
             off,
             farthest,
             most,
-            delta: delta.to_f32(),
+            delta: delta(farthest, magnitude, off).to_f32(),
             t_min: ray.t_min * length,
             span: farthest + 2.0 * shift.abs(),
             length_squared: direction.length_squared(),
             origin32: moved.as_vec3(),
             direction32: direction.as_vec3(),
         })
-    }
-
-    /// The moved origin.
-    #[inline]
-    fn moved(&self) -> DVec3 {
-        self.origin + self.direction * self.shift
     }
 
     /// The ray's interval in this space's parameter.
@@ -204,7 +250,7 @@ impl LocalRay {
     /// How far from the ray, in each axis, a primitive may lie that the tests accept.
     #[inline]
     pub(crate) fn reach(&self) -> DVec3 {
-        self.moved().abs() * U + (8.0 * U * self.farthest + self.off)
+        self.line().reach()
     }
 
     /// Not below [`LocalRay::reach`] in any axis, at less cost.
@@ -246,7 +292,7 @@ impl LocalRay {
         // By how much vertices are off, seen from the ray.
         let (origin, off) = match precision {
             // Moeller and Trumbore's test rounds otherwise, but no less.
-            Precision::Fast | Precision::Robust => (self.moved(), self.reach().max_element()),
+            Precision::Fast | Precision::Robust => (self.line().moved(), self.reach().max_element()),
             Precision::Double => {
                 let farthest = vertices.iter().fold(0.0f64, |m, v| m.max((*v - self.origin).abs().max_element()));
                 (self.origin, 8.0 * f64::UNIT_ROUNDOFF * farthest)
@@ -280,17 +326,5 @@ impl LocalRay {
         };
         let side = side.unwrap_or(Ordering::Equal);
         if along < 0.0 { side.reverse() } else { side }
-    }
-
-    /// Raises `t` (local, counted from the true origin) to where the ray enters the primitive's own box, and lowers it
-    /// to where it leaves: the rule by which a hit never lies before a box that holds it, so that skipping boxes cannot
-    /// change the answer. The box is widened by [`LocalRay::reach`]; `None` when the ray misses even that.
-    #[inline(never)]
-    pub(crate) fn within_box(&self, t: f64, aabb: &Aabb<f64>) -> Option<f64> {
-        let reach = self.reach();
-        let wide = Aabb::new(aabb.min - reach, aabb.max + reach);
-        let slabs = Slabs::new(self.moved(), self.direction);
-        let (enter, leave) = slabs.padded(&wide, f64::NEG_INFINITY, f64::INFINITY);
-        (enter <= leave).then(|| t.min(leave + self.shift).max(enter + self.shift))
     }
 }

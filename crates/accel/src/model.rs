@@ -22,7 +22,7 @@ use crate::query::{Candidate, Closest, Collect, Collector, Dyn};
 use crate::simd::{self, Available, Lanes, Work};
 use crate::stats::{DynProbe, Off, Probe};
 use crate::traverse::traverse;
-use crate::wide::{self, BoxSetup, Boxes, WideTree};
+use crate::wide::{self, Boxes, WideTree};
 use crate::{BuildError, BuildOptions, Geometry, Guards, Hit, HitId, Layout};
 
 /// The parts of one mesh, ready to be traced.
@@ -484,10 +484,10 @@ impl Model {
         let offer = OfferTriangle::<SURFACES, K>::new(self, ray, instance, collector);
         let filter = K::filter::<L>(&offer.setup, ray);
         let delta = if K::padded(&offer.setup) { ray.delta } else { 0.0 };
-        let boxes = Boxes::<L>::new(&BoxSetup::new::<L>(ray.origin32, ray.direction32, delta));
+        let boxes = Boxes::<L>::of(ray.origin32, ray.direction32, delta);
         let interval = [ray.box_t_min(collector.t_min()), ray.box_t_max(collector.t_max())];
         let ordered = collector.ordered();
-        let mut visitor = OfferTo { offer, collector };
+        let mut visitor = OfferTo { tree, offer, collector };
         if ordered {
             wide::traverse::<L, T, _, P, true>(tree, &boxes, interval, &filter, probe, &mut visitor)
         } else {
@@ -632,7 +632,7 @@ impl Model {
         // No ray meets one of the shapes more often than this.
         for _ in 0..16 {
             let Some(hit) = shape_hit(&entry.shape, &local, precision) else { break };
-            let t = if clamped { ray.within_box(hit.t, &entry.bounds) } else { Some(hit.t) };
+            let t = if clamped { ray.line().within_box(hit.t, &entry.bounds) } else { Some(hit.t) };
             if let Some(t) = t {
                 let id = HitId { instance, geometry: entry.geometry, primitive: 0 };
                 let normal = hit.normal.unwrap_or(DVec3::ZERO);

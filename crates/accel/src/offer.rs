@@ -7,11 +7,11 @@ use glam::Vec3;
 
 use crate::HitId;
 use crate::kernel::{Found, Kernel, double};
-use crate::local::LocalRay;
+use crate::local::{Line, LocalRay};
 use crate::model::Model;
 use crate::query::{Candidate, Collector};
 use crate::stats::Probe;
-use crate::wide::Visit;
+use crate::wide::{Visit, WideTree};
 
 /// Tests triangles for one ray, and offers what is hit.
 pub(crate) struct OfferTriangle<'a, const SURFACES: bool, K: Kernel> {
@@ -39,9 +39,6 @@ impl<'a, const SURFACES: bool, K: Kernel> OfferTriangle<'a, SURFACES, K> {
         collector: &mut C,
         probe: &mut P,
     ) -> ControlFlow<(), Option<f32>> {
-        if collector.leaves_out(place) {
-            return ControlFlow::Continue(None);
-        }
         let found = match known {
             _ if SURFACES => K::crosses(&self.setup, self.ray, triangle, self.limit),
             Some(known) => K::test_known(&self.setup, self.ray, triangle, known, self.limit),
@@ -52,7 +49,9 @@ impl<'a, const SURFACES: bool, K: Kernel> OfferTriangle<'a, SURFACES, K> {
             probe.fallback();
         }
         if grazing && K::clamped(&self.setup) {
-            let Some(within) = within_triangle(*self.ray, t, *triangle) else { return ControlFlow::Continue(None) };
+            let Some(within) = within_triangle(self.ray.line(), t, *triangle) else {
+                return ControlFlow::Continue(None);
+            };
             t = within;
         }
         let t = t * self.ray.t_unscale;
@@ -75,28 +74,24 @@ impl<'a, const SURFACES: bool, K: Kernel> OfferTriangle<'a, SURFACES, K> {
 }
 
 /// Offers the triangles of the wide tree.
-pub(crate) struct OfferTo<'a, const SURFACES: bool, K: Kernel, C> {
+pub(crate) struct OfferTo<'a, const SURFACES: bool, T, K: Kernel, C> {
+    pub(crate) tree: &'a T,
     pub(crate) offer: OfferTriangle<'a, SURFACES, K>,
     pub(crate) collector: &'a mut C,
 }
 
-impl<const SURFACES: bool, K: Kernel, C: Collector, P: Probe> Visit<P> for OfferTo<'_, SURFACES, K, C> {
+impl<const SURFACES: bool, T: WideTree, K: Kernel, C: Collector, P: Probe> Visit<P> for OfferTo<'_, SURFACES, T, K, C> {
     #[inline(always)]
-    fn visit(
-        &mut self,
-        place: usize,
-        triangle: &[Vec3; 3],
-        known: [f32; 3],
-        probe: &mut P,
-    ) -> ControlFlow<(), Option<f32>> {
-        self.offer.offer(place, triangle, Some(known), self.collector, probe)
+    fn visit(&mut self, place: usize, known: [f32; 3], probe: &mut P) -> ControlFlow<(), Option<f32>> {
+        let triangle = self.tree.triangle(place);
+        self.offer.offer(place, &triangle, Some(known), self.collector, probe)
     }
 }
 
-/// [`LocalRay::within_box`] for a triangle. By value, as `careful_plane`.
+/// [`Line::within_box`] for a triangle. By value, as `careful_plane`.
 #[cold]
 #[inline(never)]
-pub(crate) fn within_triangle(ray: LocalRay, t: f64, vertices: [Vec3; 3]) -> Option<f64> {
+pub(crate) fn within_triangle(line: Line, t: f64, vertices: [Vec3; 3]) -> Option<f64> {
     let [a, b, c] = double(&vertices);
-    ray.within_box(t, &Aabb::new(a.min(b).min(c), a.max(b).max(c)))
+    line.within_box(t, &Aabb::new(a.min(b).min(c), a.max(b).max(c)))
 }

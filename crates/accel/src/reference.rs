@@ -48,7 +48,7 @@ pub fn crossings(scene: &Scene, ray: &Ray<f64>, what: Crossings) -> Vec<Hit> {
                         || Shear::<f64>::new(local.direction).crosses(v.map(|p| p - local.origin)).is_some();
                     if let Some(h) = triangle::watertight(v, &local).filter(|_| crossed) {
                         let normal = triangle::normal(v).map_or(DVec3::ZERO, |n| transform.normal(n));
-                        hits.push(Hit { id, t: h.t + 0.0, u: h.u as f32, v: h.v as f32, normal });
+                        hits.push(Hit { id, t: h.t + 0.0, u: h.u as f32, v: h.v as f32, normal_direction: normal });
                     }
                 }
                 Surface::Shape(s) => {
@@ -56,7 +56,7 @@ pub fn crossings(scene: &Scene, ray: &Ray<f64>, what: Crossings) -> Vec<Hit> {
                     let mut rest = Ray { origin: local.origin * scale, direction: local.direction * scale, ..local };
                     while let Some(h) = s.shape.closest_hit(&rest) {
                         let normal = h.normal.map_or(DVec3::ZERO, |n| transform.normal(n));
-                        hits.push(Hit { id, t: h.t + 0.0, u: h.u as f32, v: h.v as f32, normal });
+                        hits.push(Hit { id, t: h.t + 0.0, u: h.u as f32, v: h.v as f32, normal_direction: normal });
                         rest.t_min = h.t.next_up();
                     }
                 }
@@ -87,7 +87,7 @@ pub fn exact_crossings(scene: &Scene, ray: &Ray<f64>, what: Crossings) -> Vec<Hi
                 Surface::Triangle(v) => {
                     if let Some(h) = exact.hit(v).filter(|h| counts(h.crosses)) {
                         let normal = triangle::normal(v).map_or(DVec3::ZERO, |n| transform.normal(n));
-                        let hit = Hit { id, t: h.t + 0.0, u: h.u as f32, v: h.v as f32, normal };
+                        let hit = Hit { id, t: h.t + 0.0, u: h.u as f32, v: h.v as f32, normal_direction: normal };
                         hits.push((exact.root(&h), hit));
                     }
                 }
@@ -100,7 +100,10 @@ pub fn exact_crossings(scene: &Scene, ray: &Ray<f64>, what: Crossings) -> Vec<Hi
                         first = Some((h.t, root.clone()));
                         if counts(found.crosses) {
                             let normal = h.normal.map_or(DVec3::ZERO, |n| transform.normal(n));
-                            hits.push((root, Hit { id, t: h.t + 0.0, u: h.u as f32, v: h.v as f32, normal }));
+                            hits.push((
+                                root,
+                                Hit { id, t: h.t + 0.0, u: h.u as f32, v: h.v as f32, normal_direction: normal },
+                            ));
                         }
                         ControlFlow::Continue(())
                     });

@@ -238,7 +238,8 @@ impl Scene {
     #[inline(always)]
     pub(crate) fn finished(&self, hit: Hit) -> Hit {
         let instance = self.inner.instances.get(hit.id.instance as usize);
-        Hit { normal: instance.map_or(DVec3::ZERO, |i| i.transform.normal(hit.normal)), ..hit }
+        let normal = instance.map_or(DVec3::ZERO, |i| i.transform.normal_direction(hit.normal_direction));
+        Hit { normal_direction: normal, ..hit }
     }
 }
 

@@ -16,21 +16,21 @@ impl Scene {
     /// surface than `origin + t * direction`: its distance from the plane does not grow with that of the ray's origin.
     #[must_use]
     pub fn surface_point(&self, ray: &Ray<f64>, hit: &Hit) -> SurfacePoint {
-        let fallback = SurfacePoint { position: ray.at(hit.t), normal: hit.normal, error: 0.0 };
+        let world_normal = hit.normal();
+        let fallback = SurfacePoint { position: ray.at(hit.t), normal: world_normal, error: 0.0 };
         let Some((instance, surface)) = self.surface(&hit.id) else { return fallback };
         let transform = &instance.transform;
         let BuildOptions { precision, guards, .. } = self.options();
         let (point, error, normal) = match surface {
-            // Hits of queries have unit normals; filters see others.
-            Surface::Triangle(v) if transform.is_uniform() && hit.normal.is_normalized() => {
+            Surface::Triangle(v) if transform.is_uniform() && world_normal != DVec3::ZERO => {
                 let (point, error) = on_triangle(v, hit, precision);
                 let position = point * transform.linear().x_axis.x + transform.translation();
                 let error = if precision == Precision::Robust && !guards.contains(Guards::OFFSET) {
                     CONSTANT_OFFSET
                 } else {
-                    distance_uniform(transform, point, error, hit.normal, position)
+                    distance_uniform(transform, point, error, world_normal, position)
                 };
-                return SurfacePoint { position, normal: hit.normal, error };
+                return SurfacePoint { position, normal: world_normal, error };
             }
             Surface::Triangle(v) => {
                 let (point, error) = on_triangle(v, hit, precision);
@@ -40,16 +40,16 @@ impl Scene {
                 // In the object's space: far from the world's origin `ray.at(t)` has lost digits that are known here.
                 let point = transform.ray_to_object(ray).at(hit.t);
                 // A unit normal of the world, back: the inverse transpose of the inverse transpose.
-                let normal = (transform.linear().transpose() * hit.normal).normalize_or_zero();
+                let normal = (transform.linear().transpose() * world_normal).normalize_or_zero();
                 let (point, error) = s.refine(point, (normal != DVec3::ZERO).then_some(normal));
                 (point, DVec3::splat(error), normal)
             }
         };
         let position = transform.point(point);
         if precision == Precision::Robust && !guards.contains(Guards::OFFSET) {
-            return SurfacePoint { position, normal: hit.normal, error: CONSTANT_OFFSET };
+            return SurfacePoint { position, normal: world_normal, error: CONSTANT_OFFSET };
         }
-        SurfacePoint { position, normal: hit.normal, error: distance(transform, point, error, normal, position) }
+        SurfacePoint { position, normal: world_normal, error: distance(transform, point, error, normal, position) }
     }
 }
 

@@ -19,7 +19,7 @@
 //!
 //! let ray = Ray::new(DVec3::new(0.1, 0.2, 9.0), DVec3::NEG_Z);
 //! if let Some(hit) = scene.closest_hit(&ray) {
-//!     println!("triangle {} at {}, facing {}", hit.id.primitive, ray.at(hit.t), hit.normal);
+//!     println!("triangle {} at {}, facing {}", hit.id.primitive, ray.at(hit.t), hit.normal());
 //!
 //!     // From there: does the light reach the point?
 //!     let point = scene.surface_point(&ray, &hit);

@@ -134,8 +134,14 @@ impl Transform {
     #[inline]
     #[must_use]
     pub fn normal(&self, n: DVec3) -> DVec3 {
-        let n = if self.uniform { n * self.normal.x_axis.x } else { self.normal * n };
-        n.normalize_or_zero()
+        self.normal_direction(n).normalize_or_zero()
+    }
+
+    /// The same, of any length.
+    #[inline]
+    #[must_use]
+    pub fn normal_direction(&self, n: DVec3) -> DVec3 {
+        if self.uniform { n * self.normal.x_axis.x } else { self.normal * n }
     }
 
     /// A point of the world in the object's space. The translation is subtracted first, where nearby points cancel

@@ -134,7 +134,7 @@ impl Errors {
             self.t_ulp_kappa_max = self.t_ulp_kappa_max.max(error / d.kappa);
         }
         let Some(normal) = accurate_normal(&triangle) else { return };
-        self.normal.push(hit.normal.cross(normal).length().atan2(hit.normal.dot(normal)));
+        self.normal.push(hit.normal().cross(normal).length().atan2(hit.normal().dot(normal)));
         let point = ray.at(hit.t);
         let off = triangle.in_world().map(|v| (point - v).dot(normal).abs());
         self.surface_ulp.push(off[0].min(off[1]).min(off[2]) / ulp(point.abs().max_element()));
@@ -143,7 +143,7 @@ impl Errors {
     /// Sends a ray away from a hit on the side it was seen from. Nothing is told of where it starts: the offset alone
     /// must do.
     fn bounce(&mut self, scene: &Scene, ray: &Ray<f64>, hit: &Hit, rng: &mut Rng) {
-        let facing = if hit.normal.dot(ray.direction) > 0.0 { -hit.normal } else { hit.normal };
+        let facing = if hit.normal().dot(ray.direction) > 0.0 { -hit.normal() } else { hit.normal() };
         if facing == DVec3::ZERO {
             return;
         }

@@ -306,7 +306,7 @@ impl Stage {
     pub(crate) fn glow<K: Kernel>(&self, hit: &Hit, looking: Vec3) -> Vec3 {
         let material = &self.materials[self.world.material(hit.id)];
         if K::LAYERS && material.glow_depends_on_view() {
-            let point = SurfacePoint { position: DVec3::ZERO, normal: hit.normal, error: 0.0 };
+            let point = SurfacePoint { position: DVec3::ZERO, normal: hit.normal(), error: 0.0 };
             return material.glow::<K>(&self.world.surface(hit, point, -looking, 0.0));
         }
         material.glow::<K>(&self.world.attributes(hit, true))
@@ -397,7 +397,7 @@ fn glowing(world: &World, materials: &[Material], dark: &Dark, effects: EffectSe
         },
         |id| dark.is_dark(world, id),
         |id, u, v| {
-            let hit = Hit { id, t: 0.0, u, v, normal: DVec3::Z };
+            let hit = Hit { id, t: 0.0, u, v, normal_direction: DVec3::Z };
             let (material, at) = (of(id), world.attributes(&hit, true));
             // How much is there of a mesh is looked up where it is asked.
             if world.is_shape(id) { material.glow::<Full>(&at) } else { material.emission::<Full>(&at) }

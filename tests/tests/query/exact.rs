@@ -248,7 +248,7 @@ fn other_tiers_agree_off_the_edges() {
             }
             assert_eq!(hits.iter().map(|h| h.id).collect::<Vec<_>>(), truth.iter().map(|h| h.id).collect::<Vec<_>>());
             assert!(hits.iter().zip(&truth).all(|(h, t)| {
-                let cosine = h.normal.dot(ray.direction).abs();
+                let cosine = h.normal().dot(ray.direction).abs();
                 (h.t - t.t).abs() <= 1e-14 / cosine
             }));
         }

@@ -93,7 +93,7 @@ fn without_the_bounded_offset_size_matters() {
             .filter(|_| {
                 let ray = Ray::new(rng.in_cube() * 0.4 * f64::from(scale), rng.direction());
                 let hit = scene.closest_hit(&ray).expect("inside");
-                let inward = -hit.normal + rng.direction() * 0.999;
+                let inward = -hit.normal() + rng.direction() * 0.999;
                 let start = scene.surface_point(&ray, &hit).spawn(inward);
                 // The far side must be met, and not the triangle that the ray leaves.
                 scene.closest_hit(&Ray::new(start, inward)).is_none_or(|next| next.id == hit.id)

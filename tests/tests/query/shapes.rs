@@ -75,7 +75,7 @@ fn placed_shapes_answer_as_brute_force() {
                     if let (Some(h), Some(t)) = (hit, twin) {
                         hits += 1;
                         assert!((h.t - t.t).abs() <= 1e-7 * t.t, "{} {precision} {place:?} {h:?} {t:?}", shape.kind());
-                        assert!((h.normal.length() - 1.0).abs() < 1e-12 || h.normal == DVec3::ZERO);
+                        assert!((h.normal().length() - 1.0).abs() < 1e-12 || h.normal() == DVec3::ZERO);
                     }
                 }
                 assert!(hits > 20, "{} {hits}", shape.kind());
@@ -99,7 +99,7 @@ fn an_infinite_plane_among_bounded_things() {
         for x in [-1e9, 4.0, 1e9] {
             let hit =
                 scene.closest_hit(&Ray::new(DVec3::new(x, 7.0, 3.0), DVec3::NEG_Y * 0.5)).expect("a floor everywhere");
-            assert_eq!((hit.id.instance, hit.id.geometry, hit.t, hit.normal), (0, 0, 10.0, DVec3::Y));
+            assert_eq!((hit.id.instance, hit.id.geometry, hit.t, hit.normal()), (0, 0, 10.0, DVec3::Y));
         }
         let hit = scene.closest_hit(&Ray::new(DVec3::new(10.1, 7.0, 0.1), DVec3::NEG_Y)).expect("the second sphere");
         assert_eq!((hit.id.instance, hit.id.geometry), (1, 1));
@@ -147,9 +147,9 @@ fn shapes_are_left_for_good() {
                     let Some(hit) = scene.closest_hit(&ray) else { continue };
                     let point = scene.surface_point(&ray, &hit);
                     let d = rng.direction();
-                    let d = d * d.dot(hit.normal).signum();
+                    let d = d * d.dot(hit.normal()).signum();
                     // Often grazing.
-                    let d = if rng.below(2) == 0 { d } else { d - hit.normal * (d.dot(hit.normal) * 0.999) };
+                    let d = if rng.below(2) == 0 { d } else { d - hit.normal() * (d.dot(hit.normal()) * 0.999) };
                     for d in [d, -d].into_iter().take(if flat { 2 } else { 1 }) {
                         let next = scene.closest_hit(&Ray::new(point.spawn(d), d));
                         assert!(next.is_none(), "{} {precision} {place:?} {hit:?} {next:?}", shape.kind());

@@ -42,7 +42,7 @@ fn bounce(scene: &Scene, place: DAffine3, count: usize) -> (usize, f64) {
         bounces += 1;
         offset += point.error / place.matrix3.x_axis.length();
         for side in [1.0, -1.0] {
-            let direction = leaving(&mut rng, hit.normal * side);
+            let direction = leaving(&mut rng, hit.normal() * side);
             // No source is skipped here: the offset alone must do.
             let away = Ray::new(point.spawn(direction), direction);
             let next = scene.closest_hit(&away);
@@ -103,10 +103,10 @@ fn spheres_are_not_met_again_from_outside() {
                 let ray = Ray::new(origin, place.transform_point3(rng.in_cube()) - origin);
                 let Some(hit) = scene.closest_hit(&ray) else { continue };
                 let point = scene.surface_point(&ray, &hit);
-                let out = leaving(&mut rng, hit.normal);
+                let out = leaving(&mut rng, hit.normal());
                 assert!(!scene.any_hit(&Ray::new(point.spawn(out), out)), "{precision} {place:?}");
                 // Inwards it must meet the other side, well away.
-                let inward = -leaving(&mut rng, hit.normal);
+                let inward = -leaving(&mut rng, hit.normal());
                 assert!(scene.any_hit(&Ray::new(point.spawn(inward), inward)), "{precision} {place:?}");
             }
         }

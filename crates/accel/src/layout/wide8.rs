@@ -214,17 +214,6 @@ impl Wide8 {
     pub(crate) fn triangle(&self, place: usize) -> Option<[Vec3; 3]> {
         self.blocks.get(place / 4).map(|b| b.triangle(place % 4))
     }
-
-    /// Asks for the node or leaf, which will be looked at soon.
-    #[inline(always)]
-    pub(crate) fn prefetch(&self, at: Reference) {
-        if at.is_leaf() {
-            prefetch(&self.blocks[at.block()]);
-            prefetch(&self.blocks[at.block() + usize::from(at.lanes() > 0xf)]);
-        } else {
-            prefetch(&self.nodes[at.index()]);
-        }
-    }
 }
 
 impl WideTree for Wide8 {
@@ -247,6 +236,21 @@ impl WideTree for Wide8 {
         // Where one block is enough, no other is fetched.
         let high = index + usize::from(lanes > 0xf);
         Blocks { index, low: &self.blocks[index], high: &self.blocks[high], lanes }
+    }
+
+    #[inline(always)]
+    fn is_large(&self) -> bool {
+        self.nodes.len() > 1 << 14
+    }
+
+    #[inline(always)]
+    fn prefetch(&self, at: Reference) {
+        if at.is_leaf() {
+            prefetch(&self.blocks[at.block()]);
+            prefetch(&self.blocks[at.block() + usize::from(at.lanes() > 0xf)]);
+        } else {
+            prefetch(&self.nodes[at.index()]);
+        }
     }
 
     #[inline(always)]

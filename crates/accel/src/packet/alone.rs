@@ -77,7 +77,7 @@ pub(super) fn trace<L: Lanes, T: Tier, const ANY: bool>(
     courses: &mut Courses,
 ) {
     let tree = among.tree;
-    let large = tree.nodes.len() > 1 << 14;
+    let large = tree.is_large();
     let mut now = Ahead { nodes: List::EMPTY, leaves: List::EMPTY };
     courses.keys.clear();
     courses.children.clear();

@@ -204,21 +204,17 @@ impl Group {
         } else {
             transformed(&linear, normal)
         };
-        // As `normalize_or_zero`.
-        let inverse = of(1.0).div(vectors::dot(normal, normal).sqrt());
-        let unit = vectors::scaled(normal, inverse);
-        let usable = of(0.0).lt(inverse) & inverse.le(of(f64::MAX));
-        for (unit, normal) in unit.into_iter().zip(&mut self.normal) {
-            unit.select(usable, of(0.0)).store(normal);
+        for (from, to) in normal.into_iter().zip(&mut self.normal) {
+            from.store(to);
         }
         for (lane, hit) in hits.iter_mut().enumerate() {
             *hit = None;
             if self.hit >> lane & 1 == 1
                 && let Some(id) = model.id(self.place(lane))
             {
-                let normal = DVec3::new(self.normal[0][lane], self.normal[1][lane], self.normal[2][lane]);
+                let normal_direction = DVec3::new(self.normal[0][lane], self.normal[1][lane], self.normal[2][lane]);
                 let id = HitId { instance: 0, geometry: id.geometry, primitive: id.primitive };
-                *hit = Some(Hit { id, t: self.t_max[lane], u: self.u[lane], v: self.v[lane], normal });
+                *hit = Some(Hit { id, t: self.t_max[lane], u: self.u[lane], v: self.v[lane], normal_direction });
             }
         }
     }

@@ -11,9 +11,10 @@ use glam::{DVec3, Vec3};
 
 use super::group::{Doubles, Group};
 use super::vectors::{self, Vectors};
-use crate::kernel::{Fast, Found, Kernel, MOST, Robust, SLIVER, STEEP, double, plane};
+use crate::kernel::{Fast, Found, MOST, Robust, SLIVER, STEEP, double, plane};
 use crate::local::{LocalRay, U};
 use crate::simd::{Eight, Lanes};
+use crate::single::Lean;
 use crate::wide::{Filter, Plain, Sheared};
 
 /// The way that the rays of a packet go.
@@ -41,9 +42,7 @@ pub(crate) struct Met<L: Lanes> {
 }
 
 /// A tier whose rays go in packets.
-pub(crate) trait Tier: Kernel {
-    /// Boxes are met as if larger.
-    const PADDED: bool;
+pub(crate) trait Tier: Lean {
     /// The filter of one ray for eight triangles.
     type One<L: Lanes>: Filter<L>;
     fn one<L: Lanes>(group: &Group, way: &Way, lane: usize) -> Self::One<L>;
@@ -82,7 +81,7 @@ fn all<E: Eight>(v: DVec3) -> Vectors<E> {
 }
 
 /// `t` with all digits and within the triangle's box, as `kernel::careful_plane` and
-/// [`LocalRay::within_box`](crate::local::LocalRay::within_box) do it, and the lanes in which there is one.
+/// [`Line::within_box`](crate::local::Line::within_box) do it, and the lanes in which there is one.
 #[inline(always)]
 fn graze<L: Lanes>(group: &Group, way: &Way, corners: [DVec3; 3]) -> (L::Eight, u32) {
     let of = L::Eight::splat;
@@ -100,7 +99,7 @@ fn graze<L: Lanes>(group: &Group, way: &Way, corners: [DVec3; 3]) -> (L::Eight, 
     let t = vectors::dot(n, near).div(vectors::dot(n, direction));
     let finite = t.abs().le(of(f64::MAX));
 
-    // `LocalRay::within_box`.
+    // `Line::within_box`.
     let (low, high) = (a.min(b).min(c).to_array(), a.max(b).max(c).to_array());
     let shift = L::Eight::load(&group.shift);
     let off = shift.abs().mul(of(32.0 * f64::UNIT_ROUNDOFF));
@@ -122,7 +121,6 @@ fn graze<L: Lanes>(group: &Group, way: &Way, corners: [DVec3; 3]) -> (L::Eight, 
 }
 
 impl Tier for Robust {
-    const PADDED: bool = true;
     type One<L: Lanes> = Sheared<L>;
 
     #[inline(always)]
@@ -146,7 +144,7 @@ impl Tier for Robust {
     #[inline(always)]
     fn meet_one(ray: &LocalRay, triangle: &[Vec3; 3], known: [f32; 3]) -> Option<Option<Found>> {
         let w = Weights::told::<true>(known)?;
-        Some(plane(triangle, ray, MOST, ray.t_min).map(|plane| plane.at(w.u, w.v)))
+        Some(plane(triangle, &ray.line(), MOST, ray.t_min).map(|plane| plane.at(w.u, w.v)))
     }
 
     #[inline(always)]
@@ -208,7 +206,6 @@ fn dot<L: Lanes>(a: [L; 3], b: [L; 3]) -> L {
 }
 
 impl Tier for Fast {
-    const PADDED: bool = false;
     type One<L: Lanes> = Plain<L>;
 
     #[inline(always)]

@@ -238,7 +238,7 @@ impl Group {
             return self.offer_one::<T, ANY>(among, index, lane, place, triangle, known);
         };
         let Some(kernel::Found { t, u, v, normal, grazing, .. }) = found else { return false };
-        let t = if grazing && T::PADDED { within_triangle(ray, t, *triangle) } else { Some(t) };
+        let t = if grazing && T::PADDED { within_triangle(ray.line(), t, *triangle) } else { Some(t) };
         // -0 becomes 0, as in a `Candidate`.
         let Some(t) = t.map(|t| t * ray.t_unscale + 0.0) else { return false };
         if !(self.t_min[lane] <= t && t <= self.t_max[lane] && t.is_finite()) || !among.model.has(place) {
@@ -263,7 +263,7 @@ impl Group {
         let Some(hit) = among.model.hit_of_one::<T>(&ray, among.transform, place, triangle, known) else {
             return false;
         };
-        self.take_one::<ANY>(among.model, lane, place, (hit.t, hit.u, hit.v), hit.normal)
+        self.take_one::<ANY>(among.model, lane, place, (hit.t, hit.u, hit.v), hit.normal_direction)
     }
 
     /// Takes a hit of one ray within its interval, but for one that another at the same distance comes before; whether

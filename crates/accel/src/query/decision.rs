@@ -35,6 +35,6 @@ impl Scene {
         {
             return local.side(vertices, self.options().precision).is_lt();
         }
-        hit.normal.dot(ray.direction) < 0.0
+        hit.normal_direction.dot(ray.direction) < 0.0
     }
 }

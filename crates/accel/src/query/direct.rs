@@ -1,19 +1,20 @@
-//! Closest and any hit, compiled for their collectors alone: they are what most rays ask. The tier and the
-//! instructions are chosen outside, once for each call.
+//! Closest and any hit, compiled for themselves alone: they are what most rays ask. The tier and the instructions are
+//! chosen outside, once for each call.
 
 use core::marker::PhantomData;
 use core::ops::ControlFlow;
 
-use firsthit_geometry::{Precision, Ray, transform::Transform};
+use firsthit_geometry::{Precision, Ray};
 
-use super::{Any, Closest, Collect, Collector, Leaving};
+use super::{Any, Closest, Collect, Collector};
 use crate::kernel::{Double, Exact, Fast, Guarded, Kernel, Robust};
 use crate::layout::compact8::Compact8;
 use crate::layout::wide8::Wide8;
-use crate::model::{Model, PrimitiveId};
+use crate::model::PrimitiveId;
 use crate::packet::{self, Courses, Packet, Tier};
 use crate::scene::{Inner, is_interval};
 use crate::simd::{self, Available, Lanes, Work};
+use crate::single::Only;
 use crate::stats::Off;
 use crate::wide::WideTree;
 use crate::{Guards, Hit, HitId, Scene};
@@ -25,7 +26,7 @@ impl Scene {
     /// The nearest hit in the ray's closed interval; `None` also for an invalid ray.
     #[must_use]
     pub fn closest_hit(&self, ray: &Ray<f64>) -> Option<Hit> {
-        self.inner().by_kernel(ClosestHit { scene: self, ray })
+        self.inner().by_shortest(One { asked: AskClosest(self), ray })
     }
 
     /// [`Scene::closest_hit`] for each ray, into the slot of the same index. The shorter slice decides how many.
@@ -34,41 +35,19 @@ impl Scene {
     /// they follow each other; the answers are the same.
     pub fn closest_hits(&self, rays: &[Ray<f64>], hits: &mut [Option<Hit>]) {
         let n = rays.len().min(hits.len());
-        let (rays, hits) = (&rays[..n], &mut hits[..n]);
-        let (precision, guards) = (self.options().precision, self.options().guards);
-        let asked = AskClosest(self);
-        match self.inner().only() {
-            Some((level, only)) if precision == Precision::Fast => {
-                simd::run(level, InPackets { only, asked, rays, answers: hits, tier: PhantomData::<Fast> });
-            }
-            Some((level, only)) if precision == Precision::Robust && guards.contains(NEEDED) => {
-                simd::run(level, InPackets { only, asked, rays, answers: hits, tier: PhantomData::<Robust> });
-            }
-            _ => self.inner().by_kernel(ClosestHits { scene: self, rays, hits }),
-        }
+        self.inner().by_shortest(Batch { asked: AskClosest(self), rays: &rays[..n], answers: &mut hits[..n] });
     }
 
     /// Whether anything lies in the ray's closed interval: true exactly when [`Scene::closest_hit`] finds something.
     #[must_use]
     pub fn any_hit(&self, ray: &Ray<f64>) -> bool {
-        self.inner().by_kernel(AnyHit { scene: self, ray })
+        self.inner().by_shortest(One { asked: AskAny(self), ray })
     }
 
     /// [`Scene::any_hit`] for each ray, into the slot of the same index. The shorter slice decides how many.
     pub fn any_hits(&self, rays: &[Ray<f64>], hits: &mut [bool]) {
         let n = rays.len().min(hits.len());
-        let (rays, hits) = (&rays[..n], &mut hits[..n]);
-        let (precision, guards) = (self.options().precision, self.options().guards);
-        let asked = AskAny;
-        match self.inner().only() {
-            Some((level, only)) if precision == Precision::Fast => {
-                simd::run(level, InPackets { only, asked, rays, answers: hits, tier: PhantomData::<Fast> });
-            }
-            Some((level, only)) if precision == Precision::Robust && guards.contains(NEEDED) => {
-                simd::run(level, InPackets { only, asked, rays, answers: hits, tier: PhantomData::<Robust> });
-            }
-            _ => self.inner().by_kernel(AnyHits { scene: self, rays, hits }),
-        }
+        self.inner().by_shortest(Batch { asked: AskAny(self), rays: &rays[..n], answers: &mut hits[..n] });
     }
 }
 
@@ -82,7 +61,7 @@ impl Scene {
     #[must_use]
     pub fn closest_hit_from(&self, ray: &Ray<f64>, source: HitId) -> Option<Hit> {
         match self.inner().left(source) {
-            Some((level, only, place)) => simd::run(level, ClosestHitFrom { only, scene: self, ray, place }),
+            Some((level, only, place)) => simd::run(level, Leaving { only, asked: AskClosest(self), ray, place }),
             None => self.closest_hit(ray),
         }
     }
@@ -91,7 +70,7 @@ impl Scene {
     #[must_use]
     pub fn any_hit_from(&self, ray: &Ray<f64>, source: HitId) -> bool {
         match self.inner().left(source) {
-            Some((level, only, place)) => simd::run(level, AnyHitFrom { only, ray, place }),
+            Some((level, only, place)) => simd::run(level, Leaving { only, asked: AskAny(self), ray, place }),
             None => self.any_hit(ray),
         }
     }
@@ -103,248 +82,29 @@ pub(crate) trait ForKernel {
     fn run<K: Kernel>(self) -> Self::Output;
 }
 
-/// [`Scene::closest_hit`].
-struct ClosestHit<'a> {
-    scene: &'a Scene,
-    ray: &'a Ray<f64>,
+/// Work that has a shorter way in a scene of one instance, at the tiers that are asked most.
+trait Shortest: ForKernel {
+    /// In any scene.
+    fn anywhere<K: Kernel>(self) -> Self::Output;
+    fn in_wide<T: Tier>(self, level: Available, only: Only<'_, Wide8>) -> Self::Output;
+    fn in_compact<T: Tier>(self, level: Available, only: Only<'_, Compact8>) -> Self::Output;
 }
 
-impl ForKernel for ClosestHit<'_> {
-    type Output = Option<Hit>;
-
-    #[inline(always)]
-    fn run<K: Kernel>(self) -> Option<Hit> {
-        let Self { scene, ray } = self;
-        if let Some((level, only)) = scene.inner().only() {
-            return simd::run(level, ClosestHitOf::<_, K> { only, scene, ray, kernel: PhantomData });
-        }
-        if let Some((level, only)) = scene.inner().only_compact::<K>() {
-            return simd::run(level, ClosestHitOf::<_, K> { only, scene, ray, kernel: PhantomData });
-        }
-        closest::<K>(scene, ray)
-    }
-}
-
-/// [`Scene::any_hit`].
-struct AnyHit<'a> {
-    scene: &'a Scene,
-    ray: &'a Ray<f64>,
-}
-
-impl ForKernel for AnyHit<'_> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn run<K: Kernel>(self) -> bool {
-        let Self { scene, ray } = self;
-        if let Some((level, only)) = scene.inner().only() {
-            return simd::run(level, AnyHitOf::<_, K> { only, ray, kernel: PhantomData });
-        }
-        if let Some((level, only)) = scene.inner().only_compact::<K>() {
-            return simd::run(level, AnyHitOf::<_, K> { only, ray, kernel: PhantomData });
-        }
-        any::<K>(scene, ray)
-    }
-}
-
-/// In any scene.
-fn closest<K: Kernel>(scene: &Scene, ray: &Ray<f64>) -> Option<Hit> {
-    let order = |a, b| scene.comes_first(ray, a, b);
-    let mut closest = Collect::new(ray, None, |_| true, Closest { order, best: None });
-    // It never breaks: the nearest hit is known at the end only.
-    let _ = scene.inner().trace_by::<false, K, _, _>(ray, &mut closest, &mut Off);
-    closest.take.best.map(|hit| scene.finished(hit))
-}
-
-/// In any scene.
-fn any<K: Kernel>(scene: &Scene, ray: &Ray<f64>) -> bool {
-    let mut any = Collect::new(ray, None, |_| true, Any);
-    scene.inner().trace_by::<false, K, _, _>(ray, &mut any, &mut Off).is_break()
-}
-
-/// [`Scene::closest_hits`]: the choice of instructions is made once for all of them.
-struct ClosestHits<'a> {
-    scene: &'a Scene,
-    rays: &'a [Ray<f64>],
-    hits: &'a mut [Option<Hit>],
-}
-
-impl ForKernel for ClosestHits<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<K: Kernel>(self) {
-        let Self { scene, rays, hits } = self;
-        if let Some((level, only)) = scene.inner().only() {
-            return simd::run(level, ClosestHitsOf::<_, K> { only, scene, rays, hits, kernel: PhantomData });
-        }
-        if let Some((level, only)) = scene.inner().only_compact::<K>() {
-            return simd::run(level, ClosestHitsOf::<_, K> { only, scene, rays, hits, kernel: PhantomData });
-        }
-        for (ray, hit) in rays.iter().zip(hits) {
-            *hit = closest::<K>(scene, ray);
-        }
-    }
-}
-
-/// [`Scene::any_hits`], likewise.
-struct AnyHits<'a> {
-    scene: &'a Scene,
-    rays: &'a [Ray<f64>],
-    hits: &'a mut [bool],
-}
-
-impl ForKernel for AnyHits<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<K: Kernel>(self) {
-        let Self { scene, rays, hits } = self;
-        if let Some((level, only)) = scene.inner().only() {
-            return simd::run(level, AnyHitsOf::<_, K> { only, rays, hits, kernel: PhantomData });
-        }
-        if let Some((level, only)) = scene.inner().only_compact::<K>() {
-            return simd::run(level, AnyHitsOf::<_, K> { only, rays, hits, kernel: PhantomData });
-        }
-        for (ray, hit) in rays.iter().zip(hits) {
-            *hit = any::<K>(scene, ray);
-        }
-    }
-}
-
-/// The only instance of a scene, of a model with a wide tree (or a compact one): there is nothing above it to be
-/// traversed.
-#[derive(Clone, Copy)]
-struct Only<'a, T> {
-    model: &'a Model,
-    tree: &'a T,
-    transform: &'a Transform,
-}
-
-impl<T: WideTree> Only<'_, T> {
-    #[inline(always)]
-    fn trace<L: Lanes, K: Kernel, C: Collector>(&self, ray: &Ray<f64>, collector: &mut C) -> ControlFlow<()> {
-        // What is not finite is found out on entering the mesh.
-        if !is_interval(ray) {
-            return ControlFlow::Continue(());
-        }
-        self.model.trace_wide::<L, false, T, K, C, Off>(self.tree, ray, (0, self.transform), collector, &mut Off)
-    }
-
-    #[inline(always)]
-    fn closest<L: Lanes, K: Kernel>(&self, scene: &Scene, ray: &Ray<f64>) -> Option<Hit> {
-        let order = |a, b| scene.comes_first(ray, a, b);
-        let mut closest = Collect::new(ray, None, |_| true, Closest { order, best: None });
-        let _ = self.trace::<L, K, _>(ray, &mut closest);
-        let hit = closest.take.best?;
-        Some(Hit { normal: self.transform.normal(hit.normal), ..hit })
-    }
-
-    #[inline(always)]
-    fn any<L: Lanes, K: Kernel>(&self, ray: &Ray<f64>) -> bool {
-        let mut any = Collect::new(ray, None, |_| true, Any);
-        self.trace::<L, K, _>(ray, &mut any).is_break()
-    }
-}
-
-/// [`ClosestHit`] in the only instance.
-struct ClosestHitOf<'a, T, K> {
-    only: Only<'a, T>,
-    scene: &'a Scene,
-    ray: &'a Ray<f64>,
-    kernel: PhantomData<K>,
-}
-
-impl<T: WideTree, K: Kernel> Work for ClosestHitOf<'_, T, K> {
-    type Output = Option<Hit>;
-
-    #[inline(always)]
-    fn run<L: Lanes>(self) -> Option<Hit> {
-        self.only.closest::<L, K>(self.scene, self.ray)
-    }
-}
-
-/// [`AnyHit`] in the only instance.
-struct AnyHitOf<'a, T, K> {
-    only: Only<'a, T>,
-    ray: &'a Ray<f64>,
-    kernel: PhantomData<K>,
-}
-
-impl<T: WideTree, K: Kernel> Work for AnyHitOf<'_, T, K> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn run<L: Lanes>(self) -> bool {
-        self.only.any::<L, K>(self.ray)
-    }
-}
-
-/// [`Scene::closest_hit_from`] in the only instance.
-struct ClosestHitFrom<'a> {
-    only: Only<'a, Wide8>,
-    scene: &'a Scene,
-    ray: &'a Ray<f64>,
-    place: usize,
-}
-
-impl Work for ClosestHitFrom<'_> {
-    type Output = Option<Hit>;
-
-    #[inline(always)]
-    fn run<L: Lanes>(self) -> Option<Hit> {
-        let Self { only, scene, ray, place } = self;
-        let order = |a, b| scene.comes_first(ray, a, b);
-        let collector = Collect::new(ray, None, |_| true, Closest { order, best: None });
-        let mut closest = Leaving { collector, place };
-        let _ = only.trace::<L, Robust, _>(ray, &mut closest);
-        let hit = closest.collector.take.best?;
-        Some(Hit { normal: only.transform.normal(hit.normal), ..hit })
-    }
-}
-
-/// [`Scene::any_hit_from`] in the only instance.
-struct AnyHitFrom<'a> {
-    only: Only<'a, Wide8>,
-    ray: &'a Ray<f64>,
-    place: usize,
-}
-
-impl Work for AnyHitFrom<'_> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn run<L: Lanes>(self) -> bool {
-        let Self { only, ray, place } = self;
-        let mut any = Leaving { collector: Collect::new(ray, None, |_| true, Any), place };
-        only.trace::<L, Robust, _>(ray, &mut any).is_break()
-    }
-}
-
-/// [`ClosestHits`] in the only instance.
-struct ClosestHitsOf<'a, T, K> {
-    only: Only<'a, T>,
-    scene: &'a Scene,
-    rays: &'a [Ray<f64>],
-    hits: &'a mut [Option<Hit>],
-    kernel: PhantomData<K>,
-}
-
-impl<T: WideTree, K: Kernel> Work for ClosestHitsOf<'_, T, K> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<L: Lanes>(self) {
-        let Self { only, scene, rays, hits, .. } = self;
-        for (ray, hit) in rays.iter().zip(hits) {
-            *hit = only.closest::<L, K>(scene, ray);
-        }
-    }
-}
-
-/// What is asked of each ray of a batch that goes in packets.
+/// What is asked of each ray.
 trait Asked: Copy {
     type Answer;
+    fn scene(&self) -> &Scene;
+    /// In any scene.
+    fn anywhere<K: Kernel>(self, ray: &Ray<f64>) -> Self::Answer;
+    /// In the only instance.
+    fn whole<L: Lanes, K: Kernel>(self, only: &Only<'_, Wide8>, ray: &Ray<f64>) -> Self::Answer;
+    /// The same by the shortest way, of a ray that may leave the triangle at a place, which is not tested.
+    fn one<L: Lanes, W: WideTree, T: Tier>(
+        self,
+        only: &Only<'_, W>,
+        ray: &Ray<f64>,
+        leaves: Option<usize>,
+    ) -> Self::Answer;
     /// Of rays that go the same way; false if they do not after all, and nothing is known.
     fn together<L: Lanes, T: Tier>(
         self,
@@ -360,15 +120,48 @@ trait Asked: Copy {
         rays: &[Ray<f64>],
         to: &mut [Self::Answer],
     );
-    fn one<L: Lanes, T: Tier>(self, only: &Only<'_, Wide8>, ray: &Ray<f64>) -> Self::Answer;
 }
 
-/// [`Scene::closest_hits`].
+/// The nearest hit.
 #[derive(Clone, Copy)]
 struct AskClosest<'a>(&'a Scene);
 
 impl Asked for AskClosest<'_> {
     type Answer = Option<Hit>;
+
+    #[inline(always)]
+    fn scene(&self) -> &Scene {
+        self.0
+    }
+
+    #[inline(always)]
+    fn anywhere<K: Kernel>(self, ray: &Ray<f64>) -> Option<Hit> {
+        let Self(scene) = self;
+        let order = |a, b| scene.comes_first(ray, a, b);
+        let mut closest = Collect::new(ray, None, |_| true, Closest { order, best: None });
+        // It never breaks: the nearest hit is known at the end only.
+        let _ = scene.inner().trace_by::<false, K, _, _>(ray, &mut closest, &mut Off);
+        closest.take.best.map(|hit| scene.finished(hit))
+    }
+
+    #[inline(always)]
+    fn whole<L: Lanes, K: Kernel>(self, only: &Only<'_, Wide8>, ray: &Ray<f64>) -> Option<Hit> {
+        let order = |a, b| self.0.comes_first(ray, a, b);
+        let mut closest = Collect::new(ray, None, |_| true, Closest { order, best: None });
+        let _ = trace::<L, K, _>(only, ray, &mut closest);
+        let hit = closest.take.best?;
+        Some(Hit { normal_direction: only.transform.normal_direction(hit.normal_direction), ..hit })
+    }
+
+    #[inline(always)]
+    fn one<L: Lanes, W: WideTree, T: Tier>(
+        self,
+        only: &Only<'_, W>,
+        ray: &Ray<f64>,
+        leaves: Option<usize>,
+    ) -> Option<Hit> {
+        only.closest_hit::<L, T>(self.0, ray, leaves)
+    }
 
     #[inline(always)]
     fn together<L: Lanes, T: Tier>(
@@ -390,19 +183,36 @@ impl Asked for AskClosest<'_> {
     ) {
         packet.closest_alone::<L, T>(rays, courses, to);
     }
-
-    #[inline(always)]
-    fn one<L: Lanes, T: Tier>(self, only: &Only<'_, Wide8>, ray: &Ray<f64>) -> Option<Hit> {
-        only.closest::<L, T>(self.0, ray)
-    }
 }
 
-/// [`Scene::any_hits`].
+/// Whether there is a hit.
 #[derive(Clone, Copy)]
-struct AskAny;
+struct AskAny<'a>(&'a Scene);
 
-impl Asked for AskAny {
+impl Asked for AskAny<'_> {
     type Answer = bool;
+
+    #[inline(always)]
+    fn scene(&self) -> &Scene {
+        self.0
+    }
+
+    #[inline(always)]
+    fn anywhere<K: Kernel>(self, ray: &Ray<f64>) -> bool {
+        let mut any = Collect::new(ray, None, |_| true, Any);
+        self.0.inner().trace_by::<false, K, _, _>(ray, &mut any, &mut Off).is_break()
+    }
+
+    #[inline(always)]
+    fn whole<L: Lanes, K: Kernel>(self, only: &Only<'_, Wide8>, ray: &Ray<f64>) -> bool {
+        let mut any = Collect::new(ray, None, |_| true, Any);
+        trace::<L, K, _>(only, ray, &mut any).is_break()
+    }
+
+    #[inline(always)]
+    fn one<L: Lanes, W: WideTree, T: Tier>(self, only: &Only<'_, W>, ray: &Ray<f64>, leaves: Option<usize>) -> bool {
+        only.any_hit::<L, T>(ray, leaves)
+    }
 
     #[inline(always)]
     fn together<L: Lanes, T: Tier>(
@@ -424,15 +234,197 @@ impl Asked for AskAny {
     ) {
         packet.any_alone::<L, T>(rays, courses, to);
     }
+}
+
+#[inline(always)]
+fn trace<L: Lanes, K: Kernel, C: Collector>(
+    only: &Only<'_, Wide8>,
+    ray: &Ray<f64>,
+    collector: &mut C,
+) -> ControlFlow<()> {
+    // What is not finite is found out on entering the mesh.
+    if !is_interval(ray) {
+        return ControlFlow::Continue(());
+    }
+    let Only { model, tree, transform } = *only;
+    model.trace_wide::<L, false, _, K, C, Off>(tree, ray, (0, transform), collector, &mut Off)
+}
+
+/// One ray.
+struct One<'a, A> {
+    asked: A,
+    ray: &'a Ray<f64>,
+}
+
+impl<A: Asked> ForKernel for One<'_, A> {
+    type Output = A::Answer;
 
     #[inline(always)]
-    fn one<L: Lanes, T: Tier>(self, only: &Only<'_, Wide8>, ray: &Ray<f64>) -> bool {
-        only.any::<L, T>(ray)
+    fn run<K: Kernel>(self) -> A::Answer {
+        let Self { asked, ray } = self;
+        match asked.scene().inner().only() {
+            Some((level, only)) => simd::run(level, Whole::<_, K> { only, asked, ray, kernel: PhantomData }),
+            None => self.anywhere::<K>(),
+        }
+    }
+}
+
+impl<A: Asked> Shortest for One<'_, A> {
+    #[inline(always)]
+    fn anywhere<K: Kernel>(self) -> A::Answer {
+        self.asked.anywhere::<K>(self.ray)
+    }
+
+    #[inline(always)]
+    fn in_wide<T: Tier>(self, level: Available, only: Only<'_, Wide8>) -> A::Answer {
+        simd::run(level, Short::<_, _, T> { only, asked: self.asked, ray: self.ray, tier: PhantomData })
+    }
+
+    #[inline(always)]
+    fn in_compact<T: Tier>(self, level: Available, only: Only<'_, Compact8>) -> A::Answer {
+        simd::run(level, Short::<_, _, T> { only, asked: self.asked, ray: self.ray, tier: PhantomData })
+    }
+}
+
+/// Many rays: the choice of instructions is made once for all of them.
+struct Batch<'a, A: Asked> {
+    asked: A,
+    rays: &'a [Ray<f64>],
+    answers: &'a mut [A::Answer],
+}
+
+impl<A: Asked> ForKernel for Batch<'_, A> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<K: Kernel>(self) {
+        let Self { asked, rays, answers } = self;
+        match asked.scene().inner().only() {
+            Some((level, only)) => {
+                simd::run(level, WholeBatch::<_, K> { only, asked, rays, answers, kernel: PhantomData })
+            }
+            None => Self { asked, rays, answers }.anywhere::<K>(),
+        }
+    }
+}
+
+impl<A: Asked> Shortest for Batch<'_, A> {
+    #[inline(always)]
+    fn anywhere<K: Kernel>(self) {
+        let Self { asked, rays, answers } = self;
+        for (ray, to) in rays.iter().zip(answers) {
+            *to = asked.anywhere::<K>(ray);
+        }
+    }
+
+    #[inline(always)]
+    fn in_wide<T: Tier>(self, level: Available, only: Only<'_, Wide8>) {
+        let Self { asked, rays, answers } = self;
+        simd::run(level, InPackets::<_, T> { only, asked, rays, answers, tier: PhantomData });
+    }
+
+    #[inline(always)]
+    fn in_compact<T: Tier>(self, level: Available, only: Only<'_, Compact8>) {
+        let Self { asked, rays, answers } = self;
+        simd::run(level, ShortBatch::<_, T> { only, asked, rays, answers, tier: PhantomData });
+    }
+}
+
+/// [`One`] in the only instance.
+struct Whole<'a, A, K> {
+    only: Only<'a, Wide8>,
+    asked: A,
+    ray: &'a Ray<f64>,
+    kernel: PhantomData<K>,
+}
+
+impl<A: Asked, K: Kernel> Work for Whole<'_, A, K> {
+    type Output = A::Answer;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> A::Answer {
+        self.asked.whole::<L, K>(&self.only, self.ray)
+    }
+}
+
+/// The same by the shortest way.
+struct Short<'a, A, W, T> {
+    only: Only<'a, W>,
+    asked: A,
+    ray: &'a Ray<f64>,
+    tier: PhantomData<T>,
+}
+
+impl<A: Asked, W: WideTree, T: Tier> Work for Short<'_, A, W, T> {
+    type Output = A::Answer;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> A::Answer {
+        self.asked.one::<L, W, T>(&self.only, self.ray, None)
+    }
+}
+
+/// The same of a ray that leaves a triangle.
+struct Leaving<'a, A> {
+    only: Only<'a, Wide8>,
+    asked: A,
+    ray: &'a Ray<f64>,
+    place: usize,
+}
+
+impl<A: Asked> Work for Leaving<'_, A> {
+    type Output = A::Answer;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> A::Answer {
+        self.asked.one::<L, _, Robust>(&self.only, self.ray, Some(self.place))
+    }
+}
+
+/// [`Batch`] in the only instance.
+struct WholeBatch<'a, A: Asked, K> {
+    only: Only<'a, Wide8>,
+    asked: A,
+    rays: &'a [Ray<f64>],
+    answers: &'a mut [A::Answer],
+    kernel: PhantomData<K>,
+}
+
+impl<A: Asked, K: Kernel> Work for WholeBatch<'_, A, K> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let Self { only, asked, rays, answers, .. } = self;
+        for (ray, to) in rays.iter().zip(answers) {
+            *to = asked.whole::<L, K>(&only, ray);
+        }
+    }
+}
+
+/// The same by the shortest way, in a compact tree.
+struct ShortBatch<'a, A: Asked, T> {
+    only: Only<'a, Compact8>,
+    asked: A,
+    rays: &'a [Ray<f64>],
+    answers: &'a mut [A::Answer],
+    tier: PhantomData<T>,
+}
+
+impl<A: Asked, T: Tier> Work for ShortBatch<'_, A, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let Self { only, asked, rays, answers, .. } = self;
+        for (ray, to) in rays.iter().zip(answers) {
+            *to = asked.one::<L, _, T>(&only, ray, None);
+        }
     }
 }
 
 /// A batch in the only instance: in packets where rays suit each other, else with some under way at a time.
-struct InPackets<'a, T, A: Asked> {
+struct InPackets<'a, A: Asked, T> {
     only: Only<'a, Wide8>,
     asked: A,
     rays: &'a [Ray<f64>],
@@ -440,7 +432,7 @@ struct InPackets<'a, T, A: Asked> {
     tier: PhantomData<T>,
 }
 
-impl<T: Tier, A: Asked> Work for InPackets<'_, T, A> {
+impl<A: Asked, T: Tier> Work for InPackets<'_, A, T> {
     type Output = ();
 
     #[inline(always)]
@@ -449,7 +441,7 @@ impl<T: Tier, A: Asked> Work for InPackets<'_, T, A> {
         // Less than a group: it would not pay to make room.
         if rays.len() < 8 {
             for (ray, to) in rays.iter().zip(answers) {
-                *to = asked.one::<L, T>(&only, ray);
+                *to = asked.one::<L, _, T>(&only, ray, None);
             }
             return;
         }
@@ -468,28 +460,8 @@ impl<T: Tier, A: Asked> Work for InPackets<'_, T, A> {
             let eights = now.len() / 8 * 8;
             asked.alone::<L, T>(&mut packet, &mut courses, &now[..eights], &mut to[..eights]);
             for (ray, to) in now[eights..].iter().zip(&mut to[eights..]) {
-                *to = asked.one::<L, T>(&only, ray);
+                *to = asked.one::<L, _, T>(&only, ray, None);
             }
-        }
-    }
-}
-
-/// [`AnyHits`] in the only instance.
-struct AnyHitsOf<'a, T, K> {
-    only: Only<'a, T>,
-    rays: &'a [Ray<f64>],
-    hits: &'a mut [bool],
-    kernel: PhantomData<K>,
-}
-
-impl<T: WideTree, K: Kernel> Work for AnyHitsOf<'_, T, K> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<L: Lanes>(self) {
-        let Self { only, rays, hits, .. } = self;
-        for (ray, hit) in rays.iter().zip(hits) {
-            *hit = only.any::<L, K>(ray);
         }
     }
 }
@@ -504,6 +476,29 @@ impl Inner {
             Precision::Double => work.run::<Double>(),
             Precision::Exact => work.run::<Exact>(),
         }
+    }
+
+    #[inline(always)]
+    fn by_shortest<W: Shortest>(&self, work: W) -> W::Output {
+        match self.options.precision {
+            Precision::Fast => self.by_shortest_of::<Fast, W>(work),
+            Precision::Robust if self.options.guards.contains(NEEDED) => self.by_shortest_of::<Robust, W>(work),
+            // Not `by_kernel`: the long way is compiled only for those that go it.
+            Precision::Robust => work.run::<Guarded>(),
+            Precision::Double => work.run::<Double>(),
+            Precision::Exact => work.run::<Exact>(),
+        }
+    }
+
+    #[inline(always)]
+    fn by_shortest_of<T: Tier, W: Shortest>(&self, work: W) -> W::Output {
+        if let Some((level, only)) = self.only() {
+            return work.in_wide::<T>(level, only);
+        }
+        if let Some((level, only)) = self.only_compact() {
+            return work.in_compact::<T>(level, only);
+        }
+        work.anywhere::<T>()
     }
 
     #[inline(always)]
@@ -526,12 +521,9 @@ impl Inner {
         Some((level, only, place))
     }
 
-    /// The same of a compact tree; for the tiers that are asked most alone, so that not everything is compiled twice.
+    /// The same of a compact tree.
     #[inline(always)]
-    fn only_compact<K: Kernel>(&self) -> Option<(Available, Only<'_, Compact8>)> {
-        if !K::DIRECT {
-            return None;
-        }
+    fn only_compact(&self) -> Option<(Available, Only<'_, Compact8>)> {
         let [instance] = &self.instances[..] else { return None };
         let model = &self.models[instance.model as usize];
         let (tree, level) = model.compact()?;

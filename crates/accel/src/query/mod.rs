@@ -23,7 +23,7 @@ pub(crate) use direct::ForKernel;
 
 use crate::{Hit, HitId};
 
-/// A hit that the collector may want. `normal` is in the instance's own space, and of any length.
+/// A hit that the collector may want, with its normal in the instance's own space.
 pub(crate) type Candidate = Hit;
 
 impl Candidate {
@@ -32,7 +32,7 @@ impl Candidate {
         // -0 becomes 0, so that lists which are sorted by bits agree with comparisons about what is equally near. What is
         // beyond the largest number is in no interval.
         let t = if t.is_finite() { t + 0.0 } else { f64::NAN };
-        Self { id, t, u, v, normal }
+        Self { id, t, u, v, normal_direction: normal }
     }
 }
 
@@ -47,11 +47,6 @@ pub(crate) trait Collector {
     fn offer(&mut self, hit: Candidate) -> ControlFlow<(), bool>;
     /// Whether finding near hits first helps.
     fn ordered(&self) -> bool;
-    /// Whether the triangle at this place of a model's tree need not be tested.
-    #[inline(always)]
-    fn leaves_out(&self, _place: usize) -> bool {
-        false
-    }
 }
 
 /// What a query does with the hits that it wants.
@@ -104,35 +99,6 @@ impl<F: FnMut(&Hit) -> bool, T: Take> Collector for Collect<F, T> {
     #[inline(always)]
     fn ordered(&self) -> bool {
         T::ORDERED
-    }
-}
-
-/// A collector of the hits of a ray that leaves one triangle of a model, so that it cannot meet it.
-pub(crate) struct Leaving<C> {
-    pub(crate) collector: C,
-    pub(crate) place: usize,
-}
-
-impl<C: Collector> Collector for Leaving<C> {
-    #[inline(always)]
-    fn t_min(&self) -> f64 {
-        self.collector.t_min()
-    }
-    #[inline(always)]
-    fn t_max(&self) -> f64 {
-        self.collector.t_max()
-    }
-    #[inline(always)]
-    fn offer(&mut self, hit: Candidate) -> ControlFlow<(), bool> {
-        self.collector.offer(hit)
-    }
-    #[inline(always)]
-    fn ordered(&self) -> bool {
-        self.collector.ordered()
-    }
-    #[inline(always)]
-    fn leaves_out(&self, place: usize) -> bool {
-        self.place == place
     }
 }
 

@@ -16,7 +16,6 @@ pub(crate) trait Eight: Copy {
     /// The larger; `o` where one is NaN.
     fn max(self, o: Self) -> Self;
     fn abs(self) -> Self;
-    fn sqrt(self) -> Self;
     /// The bits of the exponent alone: of a normal number, the power of two at or below its magnitude.
     fn exponent(self) -> Self;
     /// Lanes where `self < o`.
@@ -114,10 +113,6 @@ impl Eight for PortableEight {
         self.zip(self, |a, _| a.abs())
     }
     #[inline(always)]
-    fn sqrt(self) -> Self {
-        self.zip(self, |a, _| a.sqrt())
-    }
-    #[inline(always)]
     fn exponent(self) -> Self {
         self.zip(self, |a, _| f64::from_bits(a.to_bits() & EXPONENT))
     }
@@ -213,7 +208,6 @@ mod tests {
                 a.min(b),
                 a.max(b),
                 a.abs(),
-                a.sqrt(),
                 a.exponent(),
                 a.select(m, b),
                 L::Eight::splat(self.0[3]),

@@ -85,10 +85,6 @@ impl Eight for Ymm {
         }
     }
     #[inline(always)]
-    fn sqrt(self) -> Self {
-        unsafe { Self([_mm256_sqrt_pd(self.0[0]), _mm256_sqrt_pd(self.0[1])]) }
-    }
-    #[inline(always)]
     fn exponent(self) -> Self {
         unsafe {
             let bits = _mm256_castsi256_pd(_mm256_set1_epi64x(EXPONENT as i64));
@@ -208,10 +204,6 @@ impl Eight for Zmm {
     #[inline(always)]
     fn abs(self) -> Self {
         unsafe { Self(_mm512_abs_pd(self.0)) }
-    }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        unsafe { Self(_mm512_sqrt_pd(self.0)) }
     }
     #[inline(always)]
     fn exponent(self) -> Self {

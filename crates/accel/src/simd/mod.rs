@@ -11,12 +11,16 @@ mod avx512;
 mod eight;
 #[cfg(target_arch = "x86_64")]
 mod eight_x86;
+mod four;
+#[cfg(target_arch = "x86_64")]
+mod four_x86;
 mod portable;
 mod stack;
 #[cfg(target_arch = "x86_64")]
 mod ymm;
 
 pub(crate) use eight::{Eight, Packed};
+pub(crate) use four::{Four, OfFour};
 pub(crate) use portable::Portable;
 pub(crate) use stack::{Stack, Stacks};
 
@@ -92,7 +96,7 @@ impl core::str::FromStr for Level {
 }
 
 /// Eight `f32`. Comparisons answer with one bit for each lane, false for NaN.
-pub(crate) trait Lanes: Packed {
+pub(crate) trait Lanes: Packed + OfFour {
     fn splat(x: f32) -> Self;
     fn load(x: &[f32; 8]) -> Self;
     /// One of the rows.
@@ -139,7 +143,7 @@ impl Row {
     /// # Panics
     /// If there is no such row.
     #[inline(always)]
-    pub(crate) fn new(row: usize) -> Self {
+    pub(crate) const fn new(row: usize) -> Self {
         assert!(row < 6);
         Self(row * 8)
     }

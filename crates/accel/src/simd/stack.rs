@@ -79,6 +79,13 @@ impl<T: Copy> Top<'_, T> {
     }
 
     #[inline(always)]
+    pub(crate) fn peek(self) -> Option<T> {
+        let last = self.len.checked_sub(1)?;
+        // SAFETY: as of `pop`.
+        Some(unsafe { self.entries.get_unchecked(last).assume_init() })
+    }
+
+    #[inline(always)]
     pub(crate) fn pop(self) -> Option<T> {
         *self.len = self.len.checked_sub(1)?;
         // SAFETY: every entry below `len` was written by `push`, and `len` is below what there is room for.
@@ -135,6 +142,15 @@ impl Top<'_, u64> {
             }
             _ => a,
         }
+    }
+
+    /// Puts one on top.
+    ///
+    /// # Panics
+    /// As [`Top::push`].
+    #[inline(always)]
+    pub(crate) fn push_one(self, key: u64) {
+        self.put([key]);
     }
 
     #[inline(always)]

@@ -31,60 +31,72 @@ pub(crate) struct Axis<L> {
     pub(crate) far: L,
 }
 
-/// What a ray's [`Boxes`] are made of.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct BoxSetup {
-    inverse: [f32; 3],
-    near: [f32; 3],
-    far: [f32; 3],
-    /// 1 where the ray goes down, and so enters through the upper planes.
-    side: [u8; 3],
+/// For each octant of directions (a bit is set where the ray goes down, and so enters through the upper planes), the rows
+/// where the ray enters and where it leaves, by axis.
+static ROWS: [[[Row; 2]; 3]; 8] = {
+    let mut rows = [[[Row::new(0); 2]; 3]; 8];
+    let mut octant = 0;
+    while octant < 8 {
+        let mut k = 0;
+        while k < 3 {
+            let side = octant >> k & 1;
+            rows[octant][k] = [Row::new(Node::row(k, side)), Row::new(Node::row(k, 1 - side))];
+            k += 1;
+        }
+        octant += 1;
+    }
+    rows
+};
+
+impl<L: Lanes> Axis<L> {
+    #[inline(always)]
+    fn new([entry, exit]: [Row; 2], inverse: L, near: L, far: L) -> Self {
+        Self { entry, exit, inverse, near, far }
+    }
 }
 
-impl BoxSetup {
-    /// For boxes that are to be met as if larger by `delta` in each axis.
-    #[inline(always)]
-    pub(crate) fn new<L: Lanes>(origin: Vec3, direction: Vec3, delta: f32) -> Self {
-        // All axes at once; the other lanes are of no use.
-        let origin = L::load(&[origin.x, origin.y, origin.z, 0.0, 0.0, 0.0, 0.0, 0.0]);
-        let direction = L::load(&[direction.x, direction.y, direction.z, 1.0, 1.0, 1.0, 1.0, 1.0]);
-        let inverse = L::splat(1.0).div(direction.abs().max(L::splat(SMALLEST)).turned_by(direction));
-        let out = L::splat(delta).turned_by(direction);
-        let (near, far) = (origin.add(out).mul(inverse).store(), origin.sub(out).mul(inverse).store());
-        let (inverse, negative) = (inverse.store(), direction.negative() as u8);
-        Self {
-            inverse: [inverse[0], inverse[1], inverse[2]],
-            near: [near[0], near[1], near[2]],
-            far: [far[0], far[1], far[2]],
-            side: [negative & 1, negative >> 1 & 1, negative >> 2 & 1],
-        }
-    }
-
-    #[inline(always)]
-    fn axis<L: Lanes>(&self, k: usize) -> Axis<L> {
-        let side = usize::from(self.side[k] & 1);
-        Axis {
-            entry: Row::new(Node::row(k, side)),
-            exit: Row::new(Node::row(k, 1 - side)),
-            inverse: L::splat(self.inverse[k]),
-            near: L::splat(self.near[k]),
-            far: L::splat(self.far[k]),
-        }
-    }
+/// In the first three lanes.
+#[inline(always)]
+pub(crate) fn in_lanes<L: Lanes>(v: Vec3) -> L {
+    L::load(&[v.x, v.y, v.z, 0.0, 0.0, 0.0, 0.0, 0.0])
 }
 
 impl<L: Lanes> Boxes<L> {
+    /// For a ray (in the first three lanes), and boxes that are to be met as if larger by `delta` in each axis.
     #[inline(always)]
-    pub(crate) fn new(setup: &BoxSetup) -> Self {
-        Self { axes: [setup.axis(0), setup.axis(1), setup.axis(2)] }
+    pub(crate) fn new(origin: L, direction: L, delta: f32) -> Self {
+        // All axes at once; the other lanes are of no use.
+        let inverse = L::splat(1.0).div(direction.abs().max(L::splat(SMALLEST)).turned_by(direction));
+        let out = L::splat(delta).turned_by(direction);
+        let (near, far) = (origin.add(out).mul(inverse), origin.sub(out).mul(inverse));
+        let [x, y, z] = ROWS[direction.negative() as usize & 7];
+        Self {
+            axes: [
+                Axis::new(x, inverse.reordered(&[0; 8]), near.reordered(&[0; 8]), far.reordered(&[0; 8])),
+                Axis::new(y, inverse.reordered(&[1; 8]), near.reordered(&[1; 8]), far.reordered(&[1; 8])),
+                Axis::new(z, inverse.reordered(&[2; 8]), near.reordered(&[2; 8]), far.reordered(&[2; 8])),
+            ],
+        }
+    }
+
+    /// The same for a ray's origin and direction.
+    #[inline(always)]
+    pub(crate) fn of(origin: Vec3, direction: Vec3, delta: f32) -> Self {
+        Self::new(in_lanes(origin), in_lanes(direction), delta)
     }
 
     /// Of each axis the reciprocal, the origin times that for near and far planes, and whether (1) the ray goes down.
     #[inline(always)]
     pub(crate) fn known(axes: [(f32, [f32; 2], u32); 3]) -> Self {
         let [(ix, [nx, fx], sx), (iy, [ny, fy], sy), (iz, [nz, fz], sz)] = axes;
-        let side = [sx as u8, sy as u8, sz as u8];
-        Self::new(&BoxSetup { inverse: [ix, iy, iz], near: [nx, ny, nz], far: [fx, fy, fz], side })
+        let [x, y, z] = ROWS[(sx & 1 | (sy & 1) << 1 | (sz & 1) << 2) as usize];
+        Self {
+            axes: [
+                Axis::new(x, L::splat(ix), L::splat(nx), L::splat(fx)),
+                Axis::new(y, L::splat(iy), L::splat(ny), L::splat(fy)),
+                Axis::new(z, L::splat(iz), L::splat(nz), L::splat(fz)),
+            ],
+        }
     }
 
     /// Which children the ray meets within `[t_min, t_max]`, and where it enters them.
@@ -119,7 +131,7 @@ mod tests {
         fn run<L: Lanes>(self) -> u32 {
             // 4u|o|, and 4u of the farthest that a plane may be.
             let delta = if self.padded { (self.origin.abs().max_element() + 50.0) * 2.4e-7 } else { 0.0 };
-            let boxes = Boxes::<L>::new(&BoxSetup::new::<L>(self.origin, self.direction, delta));
+            let boxes = Boxes::<L>::of(self.origin, self.direction, delta);
             let (t_min, t_max) = (L::splat(self.t_min), L::splat(f32::INFINITY));
             let compact = boxes.test(&compact8::Node::new(self.node), t_min, t_max).0;
             let wide = boxes.test(self.node, t_min, t_max).0;

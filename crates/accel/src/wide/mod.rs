@@ -6,9 +6,7 @@ mod triangles;
 
 use core::ops::ControlFlow;
 
-use glam::Vec3;
-
-pub(crate) use boxes::{Axis, BoxSetup, Boxes, SMALLEST};
+pub(crate) use boxes::{Axis, Boxes, SMALLEST, in_lanes};
 pub(crate) use tree::{BoxNode, Leaf, WideTree};
 pub(crate) use triangles::{Either, Filter, Margin, Plain, Sheared};
 
@@ -19,15 +17,15 @@ use crate::stats::Probe;
 /// Tests triangles. A trait and not a closure, which could not be told to be inlined: into what is compiled for the
 /// level, or every call would save and load all registers.
 pub(crate) trait Visit<P> {
-    /// Gets a triangle's place and vertices, and what the filter knows of it. Answers with the new end of the interval if
-    /// it has become shorter, or breaks. Must be `#[inline(always)]`.
-    fn visit(
-        &mut self,
-        place: usize,
-        triangle: &[Vec3; 3],
-        known: [f32; 3],
-        probe: &mut P,
-    ) -> ControlFlow<(), Option<f32>>;
+    /// Gets a triangle's place, and what the filter knows of it. Answers with the new end of the interval if it has become
+    /// shorter, or breaks. Must be `#[inline(always)]`.
+    fn visit(&mut self, place: usize, known: [f32; 3], probe: &mut P) -> ControlFlow<(), Option<f32>>;
+}
+
+/// The last of all keys of children that begin no farther than the end of an interval.
+#[inline(always)]
+fn last_key(t_max: f32) -> u64 {
+    u64::from(t_max.max(0.0).to_bits()) << 32 | u64::from(u32::MAX)
 }
 
 /// Visits what the ray meets: nearer boxes first if `ORDERED`, else larger ones.
@@ -38,7 +36,7 @@ pub(crate) trait Visit<P> {
 pub(crate) fn traverse<L: Lanes, T: WideTree, F: Filter<L>, P: Probe, const ORDERED: bool>(
     tree: &T,
     boxes: &Boxes<L>,
-    [t_min, mut t_max]: [f32; 2],
+    [t_min, t_max]: [f32; 2],
     filter: &F,
     probe: &mut P,
     visitor: &mut impl Visit<P>,
@@ -46,9 +44,12 @@ pub(crate) fn traverse<L: Lanes, T: WideTree, F: Filter<L>, P: Probe, const ORDE
     if tree.root() == Reference::NOTHING {
         return ControlFlow::Continue(());
     }
+    // What is next on the stack is asked for where memory is far.
+    let large = tree.is_large();
     let start = L::splat(t_min);
     let mut ends = L::splat(t_max);
     let mut interval = filter.interval(t_min, t_max);
+    let mut last = last_key(t_max);
     // Nearest first, or without distances.
     let (mut keys, mut children) = (Stack::<u64>::new(), Stack::<u32>::new());
     let mut current = tree.root();
@@ -69,6 +70,19 @@ pub(crate) fn traverse<L: Lanes, T: WideTree, F: Filter<L>, P: Probe, const ORDE
                 current = Reference(below[hits.trailing_zeros() as usize & 7]);
                 continue;
             }
+            if ORDERED && hits.count_ones() == 2 && !probe.reversed() {
+                // Most of all: two numbers come back from memory sooner than eight are packed.
+                let enter = enter.max(L::splat(0.0)).store();
+                let (i, j) = (hits.trailing_zeros() as usize & 7, (31 - hits.leading_zeros()) as usize & 7);
+                let a = u64::from(enter[i].to_bits()) << 32 | u64::from(below[i]);
+                let b = u64::from(enter[j].to_bits()) << 32 | u64::from(below[j]);
+                current = Reference(a.min(b) as u32);
+                keys.top().push_one(a.max(b));
+                if large {
+                    tree.prefetch(Reference(a.max(b) as u32));
+                }
+                continue;
+            }
             if ORDERED {
                 // Keys are ordered by the bits of distances, which must not be negative; what begins before 0 is all
                 // alike, and never beyond the end.
@@ -76,12 +90,18 @@ pub(crate) fn traverse<L: Lanes, T: WideTree, F: Filter<L>, P: Probe, const ORDE
                 current = Reference(
                     keys.top().push_all_but_nearest(hit, hits.count_ones() as usize, probe.reversed()) as u32
                 );
+                if large && let Some(key) = keys.top().peek() {
+                    tree.prefetch(Reference(key as u32));
+                }
             } else {
                 // The largest is the last.
                 let last = 31 - hits.leading_zeros();
                 current = Reference(below[last as usize & 7]);
                 let rest = hits ^ 1 << last;
                 children.top().push(&L::pack_words(below, rest), rest.count_ones() as usize);
+                if large && let Some(child) = children.top().peek() {
+                    tree.prefetch(Reference(child));
+                }
             }
         }
         if current != Reference::NOTHING {
@@ -95,10 +115,9 @@ pub(crate) fn traverse<L: Lanes, T: WideTree, F: Filter<L>, P: Probe, const ORDE
                     let lane = candidates.trailing_zeros() as usize & 7;
                     candidates &= candidates - 1;
                     let place = leaf.place(lane);
-                    let triangle = tree.triangle(place);
                     let known = [known[0][lane], known[1][lane], known[2][lane]];
-                    if let Some(end) = visitor.visit(place, &triangle, known, probe)? {
-                        t_max = end;
+                    if let Some(end) = visitor.visit(place, known, probe)? {
+                        last = last_key(end);
                         ends = L::splat(end);
                         interval = filter.interval(t_min, end);
                     }
@@ -112,7 +131,7 @@ pub(crate) fn traverse<L: Lanes, T: WideTree, F: Filter<L>, P: Probe, const ORDE
         }
         loop {
             let Some(key) = keys.top().pop() else { return ControlFlow::Continue(()) };
-            if !probe.prunes() || f32::from_bits((key >> 32) as u32) <= t_max.max(0.0) {
+            if !probe.prunes() || key <= last {
                 current = Reference(key as u32);
                 break;
             }

@@ -19,6 +19,14 @@ pub(crate) trait WideTree {
     fn node(&self, at: Reference) -> &Self::Node;
     /// The triangles of a leaf.
     fn leaf(&self, at: Reference) -> Self::Leaf<'_>;
+    /// Whether the tree is so large that it pays to ask for nodes and leaves before they are looked at.
+    #[inline(always)]
+    fn is_large(&self) -> bool {
+        false
+    }
+    /// Asks for a node or leaf that will be looked at soon.
+    #[inline(always)]
+    fn prefetch(&self, _: Reference) {}
     /// The triangle at a place of a leaf.
     fn triangle(&self, place: usize) -> [Vec3; 3];
 }

@@ -4,7 +4,9 @@
 //!
 //! No closures and no `map` here: what is not inlined into the function compiled for the level is slow.
 
-use firsthit_geometry::triangle::Shear;
+use core::hint::black_box;
+use core::marker::PhantomData;
+
 use glam::Vec3;
 
 use crate::Guards;
@@ -14,6 +16,13 @@ use crate::wide::Leaf;
 
 /// Eight vectors.
 type Vectors<L> = [L; 3];
+
+/// What a filter knows of its ray stays in memory, and is read from there: the registers are for the test of boxes. Left to
+/// itself the compiler keeps all of it in registers, and moves it to memory and back at every leaf.
+#[inline(always)]
+fn in_memory<const N: usize>(ray: &[f32; N]) -> &[f32; N] {
+    black_box(ray)
+}
 
 #[inline(always)]
 fn vertex<L: Lanes>(leaf: &impl Leaf, vertex: usize) -> Vectors<L> {
@@ -37,16 +46,15 @@ pub(crate) trait Filter<L: Lanes>: Copy {
 /// functions that are 0, which pass.
 #[derive(Clone, Copy)]
 pub(crate) struct Sheared<L> {
-    /// In the order of `axes`.
-    origin: [L; 3],
+    /// In the order of `axes`, and the slopes.
+    ray: [f32; 5],
     /// The axes of the sheared plane and the one that the ray follows most.
     axes: [usize; 3],
-    shear: [L; 2],
     /// How far a sheared coordinate may be off the true ray's, where the decision is to be made for that.
     off: f32,
     /// The direction's component along the last axis, and how far a vertex may be off along it.
-    depth: f32,
-    slack: f32,
+    depth: L,
+    slack: L,
 }
 
 /// Edge functions, the larger coordinate of all corners, and the range of depths.
@@ -58,22 +66,30 @@ struct Projected<L> {
 }
 
 impl<L: Lanes> Sheared<L> {
+    /// For a ray (in the first three lanes).
     #[inline(always)]
-    pub(crate) fn new(origin: Vec3, direction: Vec3, shear: &Shear<f32>, off: f32, slack: f32) -> Self {
-        let axis = shear.axis();
-        let slopes = shear.slopes();
-        // Looked up in memory: no branches on what is not to be predicted.
-        const NEXT: [[usize; 3]; 4] = [[1, 2, 0], [2, 0, 1], [0, 1, 2], [0, 1, 2]];
-        let axes = NEXT[axis & 3];
-        let [x, y, z] = axes;
-        let (o, direction) = ([origin.x, origin.y, origin.z, 0.0], [direction.x, direction.y, direction.z, 0.0]);
+    pub(crate) fn new(origin: L, direction: L, off: f32, slack: f32) -> Self {
+        // Of all axes the last that is as long as any, as `Shear::new` chooses. No branches: directions of many rays are
+        // not to be predicted.
+        let length = direction.abs();
+        let most =
+            length.max(length.reordered(&[1, 2, 0, 3, 3, 3, 3, 3]).max(length.reordered(&[2, 0, 1, 3, 3, 3, 3, 3])));
+        let longest = most.le(length) & 7;
+        // Looked up in memory: the three that follow each other, by the mask of the longest.
+        static ORDERS: [[u32; 8]; 8] = {
+            let (x, y, z) = ([1, 2, 0, 0, 0, 0, 0, 0], [2, 0, 1, 0, 0, 0, 0, 0], [0, 1, 2, 0, 0, 0, 0, 0]);
+            [x, x, y, y, z, z, z, z]
+        };
+        let order = &ORDERS[longest as usize];
+        let (origin, direction) = (origin.reordered(order), direction.reordered(order));
+        let depth = direction.reordered(&[2; 8]);
+        let (o, slopes) = (origin.store(), direction.div(depth).store());
         Self {
-            origin: [L::splat(o[x & 3]), L::splat(o[y & 3]), L::splat(o[z & 3])],
-            axes,
-            shear: [L::splat(slopes.0), L::splat(slopes.1)],
+            ray: [o[0], o[1], o[2], slopes[0], slopes[1]],
+            axes: [order[0] as usize & 3, order[1] as usize & 3, order[2] as usize & 3],
             off,
-            depth: direction[axes[2] & 3],
-            slack,
+            depth,
+            slack: L::splat(slack),
         }
     }
 
@@ -81,21 +97,22 @@ impl<L: Lanes> Sheared<L> {
     #[inline(always)]
     pub(crate) fn known(origin: [f32; 3], axes: [usize; 3], slopes: [f32; 2], depth: f32, slack: f32) -> Self {
         let [x, y, z] = origin;
-        let shear = [L::splat(slopes[0]), L::splat(slopes[1])];
-        Self { origin: [L::splat(x), L::splat(y), L::splat(z)], axes, shear, off: 0.0, depth, slack }
+        let (depth, slack) = (L::splat(depth), L::splat(slack));
+        Self { ray: [x, y, z, slopes[0], slopes[1]], axes, off: 0.0, depth, slack }
     }
 
     #[inline(always)]
-    fn corner(&self, leaf: &impl Leaf, vertex: usize) -> [L; 3] {
-        let x = leaf.load::<L>(vertex, self.axes[0]).sub(self.origin[0]);
-        let y = leaf.load::<L>(vertex, self.axes[1]).sub(self.origin[1]);
-        let z = leaf.load::<L>(vertex, self.axes[2]).sub(self.origin[2]);
-        [x.sub(self.shear[0].mul(z)), y.sub(self.shear[1].mul(z)), z]
+    fn corner(&self, r: &[f32; 5], leaf: &impl Leaf, vertex: usize) -> [L; 3] {
+        let x = leaf.load::<L>(vertex, self.axes[0]).sub(L::splat(r[0]));
+        let y = leaf.load::<L>(vertex, self.axes[1]).sub(L::splat(r[1]));
+        let z = leaf.load::<L>(vertex, self.axes[2]).sub(L::splat(r[2]));
+        [x.sub(L::splat(r[3]).mul(z)), y.sub(L::splat(r[4]).mul(z)), z]
     }
 
     #[inline(always)]
     fn project(&self, leaf: &impl Leaf) -> Projected<L> {
-        let [a, b, c] = [self.corner(leaf, 0), self.corner(leaf, 1), self.corner(leaf, 2)];
+        let r = in_memory(&self.ray);
+        let [a, b, c] = [self.corner(r, leaf, 0), self.corner(r, leaf, 1), self.corner(r, leaf, 2)];
         Projected {
             edges: [edge(c, b), edge(a, c), edge(b, a)],
             size: size(a).max(size(b)).max(size(c)),
@@ -107,9 +124,8 @@ impl<L: Lanes> Sheared<L> {
     /// Depths in the interval.
     #[inline(always)]
     fn depths(&self, t_min: f32, t_max: f32) -> [L; 2] {
-        let (first, last) = (t_min * self.depth, t_max * self.depth);
-        let (low, high) = if self.depth < 0.0 { (last, first) } else { (first, last) };
-        [L::splat(low - self.slack), L::splat(high + self.slack)]
+        let (first, last) = (L::splat(t_min).mul(self.depth), L::splat(t_max).mul(self.depth));
+        [first.min(last).sub(self.slack), first.max(last).add(self.slack)]
     }
 }
 
@@ -178,14 +194,23 @@ impl<L: Lanes> Filter<L> for Margin<L> {
 /// The operations of Moeller and Trumbore's test, as `triangle::moeller_trumbore` does them: the same decision.
 #[derive(Clone, Copy)]
 pub(crate) struct Plain<L> {
-    origin: Vectors<L>,
-    direction: Vectors<L>,
+    /// Origin and direction.
+    ray: [f32; 6],
+    lanes: PhantomData<L>,
 }
 
 impl<L: Lanes> Plain<L> {
     #[inline(always)]
     pub(crate) fn new(origin: Vec3, direction: Vec3) -> Self {
-        Self { origin: splat(origin), direction: splat(direction) }
+        let (o, d) = (origin, direction);
+        Self { ray: [o.x, o.y, o.z, d.x, d.y, d.z], lanes: PhantomData }
+    }
+
+    /// For a ray in the first three lanes.
+    #[inline(always)]
+    pub(crate) fn in_lanes(origin: L, direction: L) -> Self {
+        let (o, d) = (origin.store(), direction.store());
+        Self { ray: [o[0], o[1], o[2], d[0], d[1], d[2]], lanes: PhantomData }
     }
 }
 
@@ -199,13 +224,16 @@ impl<L: Lanes> Filter<L> for Plain<L> {
 
     #[inline(always)]
     fn candidates(&self, leaf: &impl Leaf, [t_min, t_max]: &[L; 2]) -> (u32, Known<L>) {
+        let r = in_memory(&self.ray);
+        let origin: Vectors<L> = [L::splat(r[0]), L::splat(r[1]), L::splat(r[2])];
+        let direction: Vectors<L> = [L::splat(r[3]), L::splat(r[4]), L::splat(r[5])];
         let [v0, v1, v2] = [vertex::<L>(leaf, 0), vertex(leaf, 1), vertex(leaf, 2)];
         let (e1, e2) = (minus(v1, v0), minus(v2, v0));
-        let p = cross(self.direction, e2);
+        let p = cross(direction, e2);
         let det = dot(e1, p);
-        let s = minus(self.origin, v0);
+        let s = minus(origin, v0);
         let q = cross(s, e1);
-        let (u, v) = (dot(s, p), dot(self.direction, q));
+        let (u, v) = (dot(s, p), dot(direction, q));
         let (a, b, zero) = (u.turned_by(det), v.turned_by(det), L::splat(0.0));
         let inside = zero.le(a) & zero.le(b) & a.add(b).le(det.abs()) & leaf.lanes();
         if inside == 0 {
@@ -217,10 +245,6 @@ impl<L: Lanes> Filter<L> for Plain<L> {
     }
 }
 
-#[inline(always)]
-fn splat<L: Lanes>(v: Vec3) -> Vectors<L> {
-    [L::splat(v.x), L::splat(v.y), L::splat(v.z)]
-}
 #[inline(always)]
 fn minus<L: Lanes>(a: Vectors<L>, b: Vectors<L>) -> Vectors<L> {
     [a[0].sub(b[0]), a[1].sub(b[1]), a[2].sub(b[2])]
@@ -273,8 +297,8 @@ mod tests {
     use crate::layout::compact8::{Compact8, fits};
     use crate::layout::wide8::{Block, Reference, Wide8};
     use crate::simd::{Available, Level, Work, run};
-    use crate::wide::WideTree;
-    use firsthit_geometry::triangle;
+    use crate::wide::{WideTree, in_lanes};
+    use firsthit_geometry::triangle::{self, Shear};
     use proptest::prelude::*;
 
     struct Candidates<'a, T> {
@@ -289,8 +313,8 @@ mod tests {
         type Output = [u32; 3];
         #[inline(always)]
         fn run<L: Lanes>(self) -> [u32; 3] {
-            let shear = Shear::new(self.direction);
-            let sheared = Sheared::<L>::new(self.origin, self.direction, &shear, self.off, 1e-5);
+            let (origin, direction) = (in_lanes(self.origin), in_lanes(self.direction));
+            let sheared = Sheared::<L>::new(origin, direction, self.off, 1e-5);
             let ([low, high], plain) = (self.interval, Plain::<L>::new(self.origin, self.direction));
             [
                 plain.candidates(self.leaf, &plain.interval(low, high)).0,

@@ -97,8 +97,8 @@ pub(super) fn ray_sets(subject: &Subject, options: &BenchOptions) -> Result<Vec<
         .iter()
         .zip(&hits)
         .filter_map(|(ray, hit)| {
-            let hit = hit.as_ref().filter(|h| h.normal != DVec3::ZERO)?;
-            let facing = if hit.normal.dot(ray.direction) > 0.0 { -hit.normal } else { hit.normal };
+            let hit = hit.as_ref().filter(|h| h.normal() != DVec3::ZERO)?;
+            let facing = if hit.normal().dot(ray.direction) > 0.0 { -hit.normal() } else { hit.normal() };
             Some((ray.at(hit.t) + facing * (LEAVE * diagonal), facing))
         })
         .collect();

@@ -99,8 +99,8 @@ fn bounce(
         bounces += 1;
         for side in [1.0, -1.0] {
             let d = rng.direction();
-            let d = d * d.dot(hit.normal).signum() * side;
-            let d = if rng.below(2) == 0 { d } else { (d - hit.normal * d.dot(hit.normal) * 0.999).normalize() };
+            let d = d * d.dot(hit.normal()).signum() * side;
+            let d = if rng.below(2) == 0 { d } else { (d - hit.normal() * d.dot(hit.normal()) * 0.999).normalize() };
             let next = scene.closest_hit(&Ray::new(point.spawn(d), d));
             let again = next.is_some_and(|n| n.id == hit.id);
             // A sphere is met again from inside, at its other side, and only then.

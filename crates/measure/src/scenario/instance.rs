@@ -86,8 +86,8 @@ fn same(hit: Option<&Hit>, expected: Option<&FlatHit>, mirrored: &[bool]) -> boo
             let side = if mirrored[h.id.instance as usize] { -1.0 } else { 1.0 };
             [h.id.instance, h.id.geometry, h.id.primitive] == e.id
                 && (h.t - e.t).abs() < 1e-9 * (1.0 + e.t) / e.cosine
-                && (h.normal.length() - 1.0).abs() < 1e-12
-                && (h.normal * side - e.normal).length() < 1e-6
+                && (h.normal().length() - 1.0).abs() < 1e-12
+                && (h.normal() * side - e.normal).length() < 1e-6
         }
         _ => false,
     }

@@ -26,7 +26,7 @@ pub(super) type Bits = ([u32; 5], u64, [u64; 3]);
 pub(super) fn bits(hit: &Option<Hit>) -> Option<Bits> {
     hit.map(|h| {
         let id = [h.id.instance, h.id.geometry, h.id.primitive, h.u.to_bits(), h.v.to_bits()];
-        (id, h.t.to_bits(), h.normal.to_array().map(f64::to_bits))
+        (id, h.t.to_bits(), h.normal().to_array().map(f64::to_bits))
     })
 }
 

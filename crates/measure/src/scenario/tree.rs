@@ -63,7 +63,7 @@ pub(super) fn needles(check: &mut Check<'_>) {
                 let hit = scene.closest_hit(&Ray::new(origin, target - origin));
                 // Coordinates x and z round to f32, so the slope of 0.1 is kept to that only.
                 let exact = DVec3::new(-0.1, 0.0, 1.0).normalize();
-                let right = hit.is_some_and(|h| (h.normal - exact).length() < 1e-4);
+                let right = hit.is_some_and(|h| (h.normal() - exact).length() < 1e-4);
                 check.expect(right, || format!("{precision}, aspect {aspect}: {hit:?}"));
             }
         }

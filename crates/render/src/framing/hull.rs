@@ -35,7 +35,7 @@ pub(super) fn find(scene: &Scene, bounds: &Aabb<f64>) -> Option<Hull> {
         match scene.closest_hit(&Ray::new(middle, direction)) {
             Some(hit) => {
                 ended += 1;
-                front += usize::from(hit.normal.dot(direction) < 0.0);
+                front += usize::from(hit.normal().dot(direction) < 0.0);
             }
             None => free += direction,
         }
@@ -76,7 +76,7 @@ impl Floor {
             let at = |k: usize| 0.2 + 0.6 * (k as f64 + 0.5) / GRID as f64;
             let origin = bounds.min + size * DVec3::new(at(i), 0.5, at(j));
             if let Some(hit) = scene.closest_hit(&Ray::new(origin, DVec3::NEG_Y))
-                && hit.normal.y.abs() > 0.98
+                && hit.normal().y.abs() > 0.98
             {
                 heights.push(origin.y - hit.t);
             }
@@ -127,7 +127,7 @@ fn stand(scene: &Scene, bounds: &Aabb<f64>, floor: &Floor, closed: f64) -> Optio
         // Where a ray leaves the hull there is nothing to look at.
         let free = views.map(|hit| hit.map_or(0.0, |hit| hit.t.min(widest)));
         // Not inside a solid either, of which all sides are back sides.
-        let back = (0..FAN).filter(|k| views[*k].is_some_and(|hit| hit.normal.dot(ahead(*k)) > 0.0)).count();
+        let back = (0..FAN).filter(|k| views[*k].is_some_and(|hit| hit.normal().dot(ahead(*k)) > 0.0)).count();
         if free.iter().any(|d| *d < 0.02 * widest) || 2 * back > FAN {
             continue;
         }

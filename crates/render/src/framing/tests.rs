@@ -133,7 +133,7 @@ fn a_room_with_one_open_side_is_looked_into() {
         assert!((f.camera.forward() + side).length() < 1e-9, "{side}: {}", f.camera.forward());
         assert_fills_the_picture(&f.camera, &box_corners(Vec3::ONE, &DAffine3::IDENTITY));
         let back = scene.closest_hit(&Ray::new(f.camera.position(), f.camera.forward())).unwrap();
-        assert!(back.normal.dot(side) > 0.99, "the far wall is seen from its front");
+        assert!(back.normal().dot(side) > 0.99, "the far wall is seen from its front");
     }
 }
 

@@ -269,7 +269,7 @@ impl MeshLight {
         let at = p * f64::from(a) + q * f64::from(b) + r * f64::from(c);
         let area = triangle.area * factor;
         let sample = from_surface(from, at, triangle.normal, area, Vec3::ONE, triangle.both_sides, Some(triangle.id))?;
-        Some((sample, Hit { id: triangle.id, t: 1.0, u: b, v: c, normal: triangle.normal }))
+        Some((sample, Hit { id: triangle.id, t: 1.0, u: b, v: c, normal_direction: triangle.normal }))
     }
 
     /// Density of [`MeshLight::sample`] over solid angle for a direction that meets triangle `id` at `distance`; 0

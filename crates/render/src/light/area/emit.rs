@@ -82,7 +82,7 @@ impl AreaLights {
                 let share = if exact { 1e-13 } else { 1e-6 };
                 let error = share * (position.abs().max_element() + longest * longest * longest / triangle.area);
                 let normal = triangle.normal;
-                let hit = Hit { id: triangle.id, t: 0.0, u: b, v: c, normal };
+                let hit = Hit { id: triangle.id, t: 0.0, u: b, v: c, normal_direction: normal };
                 Some(Glowing {
                     point: SurfacePoint { position, normal, error },
                     area: triangle.area,

@@ -1,0 +1,230 @@
+//! One ray in a scene of one instance, for the tiers that are asked most: the shortest way in, through the tree and out.
+//!
+//! It is what a ray of these tiers goes through when it is asked alone, so the work that is done once a ray counts as much as
+//! the tree. Entering is done with all axes side by side; of a triangle nothing is worked out but `t` until it is known to be the nearest;
+//! what is rare is left to the tier's [`Kernel`](crate::kernel::Kernel). The answers are that kernel's, bit by bit.
+
+mod enter;
+mod tier;
+
+use core::marker::PhantomData;
+use core::ops::ControlFlow;
+
+use firsthit_geometry::{Ray, transform::Transform};
+
+pub(crate) use tier::Lean;
+
+use crate::local::box_t;
+use crate::model::Model;
+use crate::simd::Lanes;
+use crate::stats::Off;
+use crate::wide::{self, Boxes, Visit, WideTree};
+use crate::{Hit, HitId, Scene};
+use enter::Entered;
+use tier::Seen;
+
+/// The only instance of a scene, of a model with a wide tree (or a compact one): there is nothing above it to be
+/// traversed.
+pub(crate) struct Only<'a, T> {
+    pub(crate) model: &'a Model,
+    pub(crate) tree: &'a T,
+    pub(crate) transform: &'a Transform,
+}
+
+// Not derived: a tree need not be `Copy` for it.
+impl<T> Clone for Only<'_, T> {
+    #[inline(always)]
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T> Copy for Only<'_, T> {}
+
+impl<T: WideTree> Only<'_, T> {
+    /// The nearest hit. Of a ray that leaves the triangle at a place, that one is not tested.
+    #[inline(always)]
+    pub(crate) fn closest_hit<L: Lanes, K: Lean>(
+        &self,
+        scene: &Scene,
+        ray: &Ray<f64>,
+        leaves: Option<usize>,
+    ) -> Option<Hit> {
+        let entered = Entered::<L>::new(ray, self.transform, self.model.extent())?;
+        let from = ray.t_min * entered.t_scale;
+        let best = Best { place: NOTHING, known: [0.0; 3], kept: K::Kept::default() };
+        let mut nearest = Nearest { only: *self, scene, ray, entered, from, leaves, t_max: ray.t_max, best, odd: None };
+        let _ = self.walk::<L, K, true>(&entered, &mut nearest);
+        let Nearest { t_max, best, odd, .. } = nearest;
+        let hit = match best.place {
+            NOTHING => return None,
+            ODD => odd?,
+            _ => self.at::<K>(best, t_max)?,
+        };
+        Some(Hit { normal_direction: self.transform.normal_direction(hit.normal_direction), ..hit })
+    }
+
+    /// Whether there is a hit; likewise.
+    #[inline(always)]
+    pub(crate) fn any_hit<L: Lanes, K: Lean>(&self, ray: &Ray<f64>, leaves: Option<usize>) -> bool {
+        let Some(entered) = Entered::<L>::new(ray, self.transform, self.model.extent()) else { return false };
+        let from = ray.t_min * entered.t_scale;
+        let mut first = First { only: *self, ray, entered, from, leaves, tier: PhantomData::<K> };
+        self.walk::<L, K, false>(&entered, &mut first).is_break()
+    }
+
+    #[inline(always)]
+    fn walk<L: Lanes, K: Lean, const ORDERED: bool>(
+        &self,
+        entered: &Entered<L>,
+        visitor: &mut impl Visit<Off>,
+    ) -> ControlFlow<()> {
+        let boxes = Boxes::<L>::new(entered.origin, entered.direction, if K::PADDED { entered.delta } else { 0.0 });
+        let picks = K::picks::<L>(entered);
+        wide::traverse::<L, T, _, Off, ORDERED>(self.tree, &boxes, entered.interval, &picks, &mut Off, visitor)
+    }
+
+    /// A hit with its normal in the object's space.
+    #[inline(always)]
+    fn at<K: Lean>(&self, best: Best<K>, t: f64) -> Option<Hit> {
+        let id = self.model.id(best.place)?;
+        let (u, v, normal_direction) = K::finish(&self.tree.triangle(best.place), best.known, best.kept);
+        let id = HitId { instance: 0, geometry: id.geometry, primitive: id.primitive };
+        Some(Hit { id, t, u, v, normal_direction })
+    }
+
+    // What is rare. By value: what is passed by reference has to be kept in memory by the caller, always.
+
+    /// The hit of one triangle by the tier's kernel.
+    #[cold]
+    #[inline(never)]
+    fn unclear<K: Lean>(self, ray: &Ray<f64>, place: usize, known: [f32; 3]) -> Option<Hit> {
+        self.model.hit_of_one::<K>(ray, self.transform, place, &self.tree.triangle(place), known)
+    }
+
+    /// Whether, of two hits at the same distance, the first comes first; each is a triangle, or else what the kernel told.
+    #[cold]
+    #[inline(never)]
+    fn comes_first<K: Lean>(self, scene: &Scene, ray: &Ray<f64>, t: f64, new: Told<K>, old: Told<K>) -> bool {
+        let new = if new.0.place == ODD { new.1 } else { self.at::<K>(new.0, t) };
+        let old = if old.0.place == ODD { old.1 } else { self.at::<K>(old.0, t) };
+        match (new, old) {
+            (Some(new), Some(old)) => scene.comes_first(ray, new, old),
+            (new, _) => new.is_some(),
+        }
+    }
+}
+
+/// No place: nothing was found.
+const NOTHING: usize = usize::MAX;
+
+/// No place either: the kernel had to tell.
+const ODD: usize = usize::MAX - 1;
+
+/// A triangle and what the filter knows of it.
+struct Best<K: Lean> {
+    place: usize,
+    known: [f32; 3],
+    kept: K::Kept,
+}
+
+// Not derived: a tier need not be `Copy` for it.
+impl<K: Lean> Clone for Best<K> {
+    #[inline(always)]
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<K: Lean> Copy for Best<K> {}
+
+/// The same, with what the kernel told where it is [`ODD`].
+type Told<K> = (Best<K>, Option<Hit>);
+
+/// Keeps the nearest, of several at the same distance the first in order.
+struct Nearest<'a, L: Lanes, T, K: Lean> {
+    only: Only<'a, T>,
+    scene: &'a Scene,
+    ray: &'a Ray<f64>,
+    entered: Entered<L>,
+    /// Start of the interval, local.
+    from: f64,
+    /// The place of the triangle that the ray leaves.
+    leaves: Option<usize>,
+    /// The world's parameter of the nearest, or the end of the interval.
+    t_max: f64,
+    best: Best<K>,
+    /// The nearest where it is [`ODD`].
+    odd: Option<Hit>,
+}
+
+impl<L: Lanes, T: WideTree, K: Lean> Nearest<'_, L, T, K> {
+    /// The new end of the boxes' interval if it is the nearest so far.
+    #[inline(always)]
+    fn take(&mut self, t: f64, best: Best<K>, odd: Option<Hit>) -> Option<f32> {
+        let better = |n: &Self| {
+            n.best.place == NOTHING || n.only.comes_first::<K>(n.scene, n.ray, t, (best, odd), (n.best, n.odd))
+        };
+        if t < self.t_max || (t == self.t_max && better(self)) {
+            (self.t_max, self.best) = (t, best);
+            if best.place == ODD {
+                self.odd = odd;
+            }
+            return Some(box_t(t * self.entered.t_scale, self.entered.line.shift, 1.0));
+        }
+        None
+    }
+}
+
+impl<L: Lanes, T: WideTree, K: Lean> Visit<Off> for Nearest<'_, L, T, K> {
+    #[inline(always)]
+    fn visit(&mut self, place: usize, known: [f32; 3], _: &mut Off) -> ControlFlow<(), Option<f32>> {
+        if self.leaves == Some(place) {
+            return ControlFlow::Continue(None);
+        }
+        let triangle = self.only.tree.triangle(place);
+        ControlFlow::Continue(match K::seen(&self.entered, &triangle, known, self.from) {
+            Seen::At(t, kept) => {
+                // -0 becomes 0, as of a `Candidate`.
+                let t = t * self.entered.t_unscale + 0.0;
+                let inside = self.ray.t_min <= t && t.abs() <= f64::MAX;
+                if inside { self.take(t, Best { place, known, kept }, None) } else { None }
+            }
+            Seen::Nowhere => None,
+            Seen::Unclear => match self.only.unclear::<K>(self.ray, place, known) {
+                Some(hit) => self.take(hit.t, Best { place: ODD, known, kept: K::Kept::default() }, Some(hit)),
+                None => None,
+            },
+        })
+    }
+}
+
+/// Stops at the first.
+struct First<'a, L: Lanes, T, K> {
+    only: Only<'a, T>,
+    ray: &'a Ray<f64>,
+    entered: Entered<L>,
+    /// Start of the interval, local.
+    from: f64,
+    /// The place of the triangle that the ray leaves.
+    leaves: Option<usize>,
+    tier: PhantomData<K>,
+}
+
+impl<L: Lanes, T: WideTree, K: Lean> Visit<Off> for First<'_, L, T, K> {
+    #[inline(always)]
+    fn visit(&mut self, place: usize, known: [f32; 3], _: &mut Off) -> ControlFlow<(), Option<f32>> {
+        if self.leaves == Some(place) {
+            return ControlFlow::Continue(None);
+        }
+        let hit = match K::seen(&self.entered, &self.only.tree.triangle(place), known, self.from) {
+            Seen::At(t, _) => {
+                let t = t * self.entered.t_unscale;
+                self.ray.t_min <= t && t <= self.ray.t_max && t.abs() <= f64::MAX
+            }
+            Seen::Nowhere => false,
+            Seen::Unclear => self.only.unclear::<K>(self.ray, place, known).is_some(),
+        };
+        if hit { ControlFlow::Break(()) } else { ControlFlow::Continue(None) }
+    }
+}
