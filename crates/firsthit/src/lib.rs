@@ -27,7 +27,7 @@
 //!     let start = point.spawn(light - point.position);
 //!     println!("in shadow: {}", scene.any_hit(&Ray::segment(start, light)));
 //! }
-//! # assert_eq!(scene.closest_hit(&ray).map(|h| (h.t, h.normal)), Some((8.5, DVec3::Z)));
+//! # assert_eq!(scene.closest_hit(&ray).map(|h| (h.t, h.normal())), Some((8.5, DVec3::Z)));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //! With triangles in memory, [`SceneBuilder::add_mesh`] takes them, and no file format is compiled in without the

@@ -97,8 +97,8 @@ impl OfFour for Portable {
     #[inline(always)]
     fn reordered(self, lanes: &[u32; 8]) -> Self {
         let mut out = self;
-        for k in 0..8 {
-            out.0[k] = self.0[lanes[k] as usize & 7];
+        for (out, lane) in out.0.iter_mut().zip(lanes) {
+            *out = self.0[*lane as usize & 7];
         }
         out
     }

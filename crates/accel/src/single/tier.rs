@@ -82,7 +82,7 @@ impl Lean for Robust {
         // As `Weights::told`, without its division: what is near the ends of what numbers there are is not for here.
         let [e0, e1, e2] = known;
         let (sum, least) = ((e0 + e1 + e2).abs(), e0.abs().min(e1.abs()).min(e2.abs()));
-        if !((sum >= 1e-36) & (sum <= 1e36) & (least > 0.0)) {
+        if !((1e-36..=1e36).contains(&sum) & (least > 0.0)) {
             return Seen::Unclear;
         }
         match short_plane(triangle, &ray.line, MOST, from) {

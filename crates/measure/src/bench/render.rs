@@ -154,7 +154,7 @@ const BOUNCES: u32 = 64;
 /// let nothing = RenderSubject { name: "nothing".into(), scene: Arc::new(SceneDesc::default()), reference: None };
 /// let options = RenderBenchOptions { spp: vec![4], threads: vec![1], size: (8, 8), ..Default::default() };
 /// let bench = run_renders(&[nothing], &options, &())?;
-/// assert_eq!((bench.rows[0].spp, bench.rows[0].rays), (4, 256));
+/// assert_eq!((bench.rows[0].spp, bench.rows[0].rays), (4, 0)); // where there is nothing no ray is cast
 /// # Ok::<(), firsthit_measure::MeasureError>(())
 /// ```
 ///
