@@ -2,8 +2,8 @@
 # Renders the pictures of docs/gallery.md again, with no flags: bash docs/gallery/make.sh FOLDER OF SAMPLE MODELS
 # The folder has balloon/ and khronos/NAME/ in it. A picture takes at most a minute; its words say how long it took.
 set -euo pipefail
+models=$(realpath "$1")
 cd "$(dirname "$0")/../.."
-models=$1
 cargo build --release
 cargo build --release -p firsthit-tests --bin contact-sheet
 work=$(mktemp -d)

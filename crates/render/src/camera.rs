@@ -441,6 +441,14 @@ impl FilmCamera {
         (depth > 0.0).then(|| [0.5 * (x + 1.0) * self.size[0], 0.5 * (1.0 - y) * self.size[1]])
     }
 
+    /// How many pixels such a part of the coordinates of the camera and a point in front of it makes, there.
+    #[inline]
+    pub(crate) fn pixels(&self, point: DVec3, part: f64) -> f64 {
+        let length = (point.abs() + self.position.abs()).max_element() * part;
+        let depth = if self.perspective { (point - self.position).dot(self.forward) } else { 1.0 };
+        length / (depth * self.pixel)
+    }
+
     /// How wide a pixel's view is (in the middle of the picture).
     #[inline]
     #[must_use]

@@ -17,6 +17,8 @@ use crate::surface::World;
 const SIDE: u32 = 4;
 /// Of a mesh with more triangles in all places together, the box is put on the picture instead.
 const MOST: usize = 4_000_000;
+/// How far from its triangle a hit may lie, as part of the coordinates: more than what queries round, `u|o| + 8uR`.
+const ROUNDED: f64 = 1e-6;
 /// Triangles that one thread takes at a time.
 const PORTION: usize = 8192;
 
@@ -91,6 +93,10 @@ impl Marks<'_> {
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for point in points {
             let Some(at) = self.camera.place(point).filter(|at| (at[0] + at[1]).is_finite()) else { return false };
+            // So near that what queries may be off is to be seen.
+            if self.camera.pixels(point, ROUNDED) > 0.5 {
+                return false;
+            }
             for k in 0..2 {
                 low[k] = low[k].min(at[k]);
                 high[k] = high[k].max(at[k]);
@@ -191,6 +197,18 @@ mod tests {
             }
             assert!(without > SIZE.0 * SIZE.1 / 2 && hits > 1000, "{without} {hits}");
         }
+    }
+
+    #[test]
+    fn what_is_too_near_for_its_size_leaves_it_open() {
+        // A thousand units of the mesh from its middle, and a millionth of them is a pixel.
+        let at = DVec3::new(0.0, 1000.0, 0.0);
+        let camera = |distance: f64| Camera::look_at(at + DVec3::Z * distance, at, DVec3::Y, 0.9).unwrap();
+        let positions = [[-1e3, 0.0, 0.0], [1e3, 0.0, 0.0], [0.0, 1e3, 0.0]].map(Vec3::from).to_vec();
+        let mesh = TriangleMesh { positions, triangles: vec![[0, 1, 2]], ..TriangleMesh::default() };
+        let scene = scene(vec![(SurfaceDesc::Triangles(mesh), DVec3::ZERO)]);
+        assert!(empty(&scene, &camera(1e-2), 0.5).is_none());
+        assert!(empty(&scene, &camera(1e3), 0.5).is_some());
     }
 
     #[test]

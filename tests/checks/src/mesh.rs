@@ -173,7 +173,7 @@ fn build(parts: &[Part], places: &[DAffine3], options: BuildOptions) -> Result<S
 type Bits = (HitId, u64, [u32; 2], [u64; 3]);
 
 fn bits(h: &Hit) -> Bits {
-    (h.id, h.t.to_bits(), [h.u.to_bits(), h.v.to_bits()], h.normal().to_array().map(f64::to_bits))
+    (h.id, h.t.to_bits(), [h.u.to_bits(), h.v.to_bits()], h.normal_direction.to_array().map(f64::to_bits))
 }
 
 /// Such that lists can be compared that broke a tie in another way.

@@ -10,6 +10,7 @@ mod leaks;
 mod packets;
 mod rays;
 mod shapes;
+mod single;
 mod spawn;
 mod twins;
 
@@ -59,5 +60,5 @@ type Bits = (HitId, u64, u32, u32, [u64; 3]);
 
 /// For comparisons in which no bit may differ, not even a sign of zero.
 fn bits(h: &Option<Hit>) -> Option<Bits> {
-    h.map(|h| (h.id, h.t.to_bits(), h.u.to_bits(), h.v.to_bits(), h.normal().to_array().map(f64::to_bits)))
+    h.map(|h| (h.id, h.t.to_bits(), h.u.to_bits(), h.v.to_bits(), h.normal_direction.to_array().map(f64::to_bits)))
 }

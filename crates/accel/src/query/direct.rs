@@ -32,7 +32,7 @@ impl Scene {
     /// [`Scene::closest_hit`] for each ray, into the slot of the same index. The shorter slice decides how many.
     ///
     /// Rays that go the same way, as those of neighbouring pixels in the order of small squares, are traced together where
-    /// they follow each other; the answers are the same.
+    /// they follow each other; the answers are the same (of [`Precision::Fast`] but for rays at the very edges of boxes).
     pub fn closest_hits(&self, rays: &[Ray<f64>], hits: &mut [Option<Hit>]) {
         let n = rays.len().min(hits.len());
         self.inner().by_shortest(Batch { asked: AskClosest(self), rays: &rays[..n], answers: &mut hits[..n] });
@@ -55,7 +55,8 @@ impl Scene {
 impl Scene {
     /// [`Scene::closest_hit`] of a ray that starts where [`SurfacePoint::spawn`] says on the triangle `source`, and goes away
     /// from it: the same answer, found sooner. That the ray does not meet the triangle that it comes from would take many
-    /// digits to tell; here that triangle is not tested (where the precision is [`Precision::Robust`], of scenes of one instance).
+    /// digits to tell; here that triangle is not tested (at [`Precision::Robust`], in
+    /// scenes of one instance of the wide layout; in others it is).
     ///
     /// [`SurfacePoint::spawn`]: crate::SurfacePoint::spawn
     #[must_use]

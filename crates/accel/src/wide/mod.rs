@@ -25,7 +25,8 @@ pub(crate) trait Visit<P> {
 /// The last of all keys of children that begin no farther than the end of an interval.
 #[inline(always)]
 fn last_key(t_max: f32) -> u64 {
-    u64::from(t_max.max(0.0).to_bits()) << 32 | u64::from(u32::MAX)
+    // Adding 0 makes 0 of -0.
+    u64::from((t_max.max(0.0) + 0.0).to_bits()) << 32 | u64::from(u32::MAX)
 }
 
 /// Visits what the ray meets: nearer boxes first if `ORDERED`, else larger ones.
