@@ -104,6 +104,14 @@ fn same(scene: &Scene, ray: &Ray<f64>) -> Result<(), TestCaseError> {
     let (single, general) = (scene.closest_hit(ray), scene.closest_hit_counted(ray).0);
     prop_assert_eq!(bits(&single), bits(&general), "{:?} {:?}", scene.options(), ray);
     prop_assert_eq!(scene.any_hit(ray), general.is_some(), "{:?} {:?}", scene.options(), ray);
+    let (mut hits, mut any) = ([None; 8], [false; 8]);
+    scene.closest_hits(&[*ray; 8], &mut hits);
+    scene.any_hits(&[*ray; 8], &mut any);
+    // Of `Fast`, what lies at the very edge of a box may differ.
+    if scene.options().precision == Precision::Robust {
+        prop_assert_eq!(hits.map(|h| bits(&h)), [bits(&single); 8], "{:?} {:?}", scene.options(), ray);
+        prop_assert_eq!(any, [single.is_some(); 8], "{:?} {:?}", scene.options(), ray);
+    }
     Ok(())
 }
 

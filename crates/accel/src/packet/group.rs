@@ -6,7 +6,7 @@ use glam::{DMat3, DVec3, Vec3};
 use super::vectors::{self, Vectors};
 use crate::local::{Extent, FAR, LocalRay, TINY, U, box_t};
 use crate::simd::{Eight, Lanes};
-use crate::wide::{Boxes, SMALLEST};
+use crate::wide::{Boxes, SMALLEST, kept_near};
 
 /// A number of each ray.
 pub(super) type Doubles = [f64; 8];
@@ -185,10 +185,11 @@ impl Group {
         for axis in 0..3 {
             let (origin, direction) = (L::narrow(moved[axis]), L::narrow(direction[axis]));
             let inverse = L::splat(1.0).div(direction.abs().max(L::splat(SMALLEST)).turned_by(direction));
-            let out = delta.turned_by(direction);
             origin.put(&mut self.origin32[axis]);
             direction.put(&mut self.direction32[axis]);
             inverse.put(&mut self.inverse[axis]);
+            // As `Boxes::new`.
+            let (origin, out) = (kept_near(origin), kept_near(delta).turned_by(direction));
             origin.add(out).mul(inverse).put(&mut self.near[axis]);
             origin.sub(out).mul(inverse).put(&mut self.far[axis]);
             self.negative[axis] = direction.negative();

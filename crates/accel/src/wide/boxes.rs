@@ -10,6 +10,16 @@ use crate::wide::BoxNode;
 /// less than the slack in the boxes' padding.
 pub(crate) const SMALLEST: f32 = 1e-18;
 
+/// Origins are kept so near, and boxes no larger than by so much, that their products with reciprocals are finite. What is
+/// farther (in units of a normalised object) has no digit left that says where it is.
+pub(crate) const FARTHEST: f32 = 1e20;
+
+/// A number for the test of boxes: within [`FARTHEST`], also where it was infinite or none.
+#[inline(always)]
+pub(crate) fn kept_near<L: Lanes>(x: L) -> L {
+    x.max(L::splat(-FARTHEST)).min(L::splat(FARTHEST))
+}
+
 /// A ray for the test of eight boxes: `plane * inverse - origin * inverse`, which is one instruction.
 ///
 /// Its error, against the exact reciprocal: the product with the origin is rounded (`u |o|` in the plane's place), and
@@ -67,7 +77,7 @@ impl<L: Lanes> Boxes<L> {
     pub(crate) fn new(origin: L, direction: L, delta: f32) -> Self {
         // All axes at once; the other lanes are of no use.
         let inverse = L::splat(1.0).div(direction.abs().max(L::splat(SMALLEST)).turned_by(direction));
-        let out = L::splat(delta).turned_by(direction);
+        let (origin, out) = (kept_near(origin), kept_near(L::splat(delta)).turned_by(direction));
         let (near, far) = (origin.add(out).mul(inverse), origin.sub(out).mul(inverse));
         let [x, y, z] = ROWS[direction.negative() as usize & 7];
         Self {
