@@ -144,7 +144,7 @@ proptest! {
                     scene = scene.refit(0, &[geometry(&moved)]).map_err(|e| TestCaseError::fail(e.to_string()))?;
                 }
                 for aim in &aims {
-                    let ray = ray(aim.clone(), &corners, size);
+                    let ray = ray(*aim, &corners, size);
                     same(&scene, &ray)?;
                     if let Some(hit) = scene.closest_hit(&ray) {
                         for (t_min, t_max) in [(ray.t_min, hit.t), (hit.t, ray.t_max), (ray.t_min, hit.t.next_down())] {
