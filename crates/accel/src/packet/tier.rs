@@ -121,10 +121,10 @@ fn graze<L: Lanes>(group: &Group, way: &Way, corners: [DVec3; 3]) -> (L::Eight, 
 }
 
 impl Tier for Robust {
-    type One<L: Lanes> = Sheared<L>;
+    type One<L: Lanes> = Sheared<L, false>;
 
     #[inline(always)]
-    fn one<L: Lanes>(group: &Group, way: &Way, lane: usize) -> Sheared<L> {
+    fn one<L: Lanes>(group: &Group, way: &Way, lane: usize) -> Sheared<L, false> {
         let origin = [group.sheared[0][lane], group.sheared[1][lane], group.sheared[2][lane]];
         let slopes = [group.slopes[0][lane], group.slopes[1][lane]];
         Sheared::known(origin, way.axes, slopes, group.direction32[way.axes[2]][lane], 2.0 * group.delta[lane])
@@ -206,10 +206,10 @@ fn dot<L: Lanes>(a: [L; 3], b: [L; 3]) -> L {
 }
 
 impl Tier for Fast {
-    type One<L: Lanes> = Plain<L>;
+    type One<L: Lanes> = Plain<L, false>;
 
     #[inline(always)]
-    fn one<L: Lanes>(group: &Group, _: &Way, lane: usize) -> Plain<L> {
+    fn one<L: Lanes>(group: &Group, _: &Way, lane: usize) -> Plain<L, false> {
         let ([x, y, z], d) = (&group.origin32, &group.direction32);
         Plain::new(Vec3::new(x[lane], y[lane], z[lane]), Vec3::new(d[0][lane], d[1][lane], d[2][lane]))
     }

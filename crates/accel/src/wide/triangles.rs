@@ -20,8 +20,9 @@ type Vectors<L> = [L; 3];
 /// What a filter knows of its ray stays in memory, and is read from there: the registers are for the test of boxes. Left to
 /// itself the compiler keeps all of it in registers, and moves it to memory and back at every leaf.
 #[inline(always)]
-fn in_memory<const N: usize>(ray: &[f32; N]) -> &[f32; N] {
-    black_box(ray)
+fn in_memory<const MANY: bool, const N: usize>(ray: &[f32; N]) -> &[f32; N] {
+    // For one leaf there is nothing to be gained, and a way through memory to be lost.
+    if MANY { black_box(ray) } else { ray }
 }
 
 #[inline(always)]
@@ -42,10 +43,10 @@ pub(crate) trait Filter<L: Lanes>: Copy {
     fn candidates(&self, leaf: &impl Leaf, interval: &Self::Interval) -> (u32, Known<L>);
 }
 
-/// The operations of the watertight test in `f32`, as [`Shear::weights`] does them: the same decision, but for edge
+/// `MANY`: for many leaves, else for one. The operations of the watertight test in `f32`, as [`Shear::weights`] does them: the same decision, but for edge
 /// functions that are 0, which pass.
 #[derive(Clone, Copy)]
-pub(crate) struct Sheared<L> {
+pub(crate) struct Sheared<L, const MANY: bool = true> {
     /// In the order of `axes`, and the slopes.
     ray: [f32; 5],
     /// The axes of the sheared plane and the one that the ray follows most.
@@ -65,7 +66,7 @@ struct Projected<L> {
     farthest: L,
 }
 
-impl<L: Lanes> Sheared<L> {
+impl<L: Lanes, const MANY: bool> Sheared<L, MANY> {
     /// For a ray (in the first three lanes).
     #[inline(always)]
     pub(crate) fn new(origin: L, direction: L, off: f32, slack: f32) -> Self {
@@ -111,7 +112,7 @@ impl<L: Lanes> Sheared<L> {
 
     #[inline(always)]
     fn project(&self, leaf: &impl Leaf) -> Projected<L> {
-        let r = in_memory(&self.ray);
+        let r = in_memory::<MANY, _>(&self.ray);
         let [a, b, c] = [self.corner(r, leaf, 0), self.corner(r, leaf, 1), self.corner(r, leaf, 2)];
         Projected {
             edges: [edge(c, b), edge(a, c), edge(b, a)],
@@ -148,7 +149,7 @@ fn size<L: Lanes>(p: [L; 3]) -> L {
     p[0].abs().max(p[1].abs())
 }
 
-impl<L: Lanes> Filter<L> for Sheared<L> {
+impl<L: Lanes, const MANY: bool> Filter<L> for Sheared<L, MANY> {
     type Interval = [L; 2];
 
     #[inline(always)]
@@ -193,13 +194,13 @@ impl<L: Lanes> Filter<L> for Margin<L> {
 
 /// The operations of Moeller and Trumbore's test, as `triangle::moeller_trumbore` does them: the same decision.
 #[derive(Clone, Copy)]
-pub(crate) struct Plain<L> {
+pub(crate) struct Plain<L, const MANY: bool = true> {
     /// Origin and direction.
     ray: [f32; 6],
     lanes: PhantomData<L>,
 }
 
-impl<L: Lanes> Plain<L> {
+impl<L: Lanes, const MANY: bool> Plain<L, MANY> {
     #[inline(always)]
     pub(crate) fn new(origin: Vec3, direction: Vec3) -> Self {
         let (o, d) = (origin, direction);
@@ -214,7 +215,7 @@ impl<L: Lanes> Plain<L> {
     }
 }
 
-impl<L: Lanes> Filter<L> for Plain<L> {
+impl<L: Lanes, const MANY: bool> Filter<L> for Plain<L, MANY> {
     type Interval = [L; 2];
 
     #[inline(always)]
@@ -224,7 +225,7 @@ impl<L: Lanes> Filter<L> for Plain<L> {
 
     #[inline(always)]
     fn candidates(&self, leaf: &impl Leaf, [t_min, t_max]: &[L; 2]) -> (u32, Known<L>) {
-        let r = in_memory(&self.ray);
+        let r = in_memory::<MANY, _>(&self.ray);
         let origin: Vectors<L> = [L::splat(r[0]), L::splat(r[1]), L::splat(r[2])];
         let direction: Vectors<L> = [L::splat(r[3]), L::splat(r[4]), L::splat(r[5])];
         let [v0, v1, v2] = [vertex::<L>(leaf, 0), vertex(leaf, 1), vertex(leaf, 2)];
