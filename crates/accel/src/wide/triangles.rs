@@ -43,8 +43,8 @@ pub(crate) trait Filter<L: Lanes>: Copy {
     fn candidates(&self, leaf: &impl Leaf, interval: &Self::Interval) -> (u32, Known<L>);
 }
 
-/// `MANY`: for many leaves, else for one. The operations of the watertight test in `f32`, as [`Shear::weights`] does them: the same decision, but for edge
-/// functions that are 0, which pass.
+/// The operations of the watertight test in `f32`, as [`Shear::weights`] does them: the same decision, but for edge
+/// functions that are 0, which pass. It serves `MANY` leaves, or one.
 #[derive(Clone, Copy)]
 pub(crate) struct Sheared<L, const MANY: bool = true> {
     /// In the order of `axes`, and the slopes.
