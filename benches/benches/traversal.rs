@@ -62,8 +62,7 @@ fn rays(scene: &Scene) -> (Vec<Ray<f64>>, Vec<Ray<f64>>) {
         .iter()
         .filter_map(|r| {
             let hit = scene.closest_hit(r)?;
-            let side = if hit.normal().dot(r.direction) > 0.0 { -1.0 } else { 1.0 };
-            let d = hit.normal() * side * 1.001 + rng.direction();
+            let d = hit.normal_against(r.direction) * 1.001 + rng.direction();
             Some(Ray::new(scene.surface_point(r, &hit).spawn(d), d))
         })
         .collect();

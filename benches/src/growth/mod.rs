@@ -219,7 +219,7 @@ fn rays_of(model: &Model, scene: &Scene, count: usize) -> [Vec<Ray<f64>>; 2] {
         .iter()
         .filter_map(|ray| {
             let hit = scene.closest_hit(ray)?;
-            let normal = if hit.normal().dot(ray.direction) > 0.0 { -hit.normal() } else { hit.normal() };
+            let normal = hit.normal_against(ray.direction);
             Some((ray.at(hit.t) + normal * off, normal))
         })
         .collect();

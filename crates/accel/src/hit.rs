@@ -37,6 +37,14 @@ impl Hit {
     pub fn normal(&self) -> DVec3 {
         self.normal_direction.normalize_or_zero()
     }
+
+    /// [`Hit::normal`] on the side that a ray of this direction comes from.
+    #[inline]
+    #[must_use]
+    pub fn normal_against(&self, direction: DVec3) -> DVec3 {
+        let normal = self.normal();
+        if normal.dot(direction) > 0.0 { -normal } else { normal }
+    }
 }
 
 /// A point on a surface, known to within an error bound: what rays start from.

@@ -143,7 +143,7 @@ impl Errors {
     /// Sends a ray away from a hit on the side it was seen from. Nothing is told of where it starts: the offset alone
     /// must do.
     fn bounce(&mut self, scene: &Scene, ray: &Ray<f64>, hit: &Hit, rng: &mut Rng) {
-        let facing = if hit.normal().dot(ray.direction) > 0.0 { -hit.normal() } else { hit.normal() };
+        let facing = hit.normal_against(ray.direction);
         if facing == DVec3::ZERO {
             return;
         }

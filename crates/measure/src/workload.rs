@@ -103,8 +103,8 @@ pub fn ray_sets(
         .iter()
         .filter_map(|ray| {
             let hit = scene.closest_hit(ray)?;
-            let facing = if hit.normal().dot(ray.direction) > 0.0 { -hit.normal() } else { hit.normal() };
-            (hit.normal() != DVec3::ZERO).then(|| (coarse.surface_point(ray, &hit), facing))
+            let facing = hit.normal_against(ray.direction);
+            (facing != DVec3::ZERO).then(|| (coarse.surface_point(ray, &hit), facing))
         })
         .collect();
 

@@ -97,9 +97,9 @@ pub(super) fn ray_sets(subject: &Subject, options: &BenchOptions) -> Result<Vec<
         .iter()
         .zip(&hits)
         .filter_map(|(ray, hit)| {
-            let hit = hit.as_ref().filter(|h| h.normal() != DVec3::ZERO)?;
-            let facing = if hit.normal().dot(ray.direction) > 0.0 { -hit.normal() } else { hit.normal() };
-            Some((ray.at(hit.t) + facing * (LEAVE * diagonal), facing))
+            let hit = hit.as_ref()?;
+            let facing = hit.normal_against(ray.direction);
+            (facing != DVec3::ZERO).then(|| (ray.at(hit.t) + facing * (LEAVE * diagonal), facing))
         })
         .collect();
     let light = camera.position() + (camera.right() + camera.up()) * (0.5 * diagonal);
