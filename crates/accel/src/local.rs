@@ -54,7 +54,7 @@ fn largest(v: DVec3) -> f64 {
 }
 
 /// The bits of an `f64`'s exponent.
-pub(crate) const EXPONENT: u64 = 0x7ff << 52;
+const EXPONENT: u64 = 0x7ff << 52;
 
 fn half_size(bounds: &Aabb<f64>) -> f64 {
     bounds.extent().max_element() * 0.5
@@ -87,14 +87,44 @@ impl Extent {
     }
 }
 
-/// See [`LocalRay::most`] and [`LocalRay::delta`].
+/// The power of two at or below a direction's largest component, and its reciprocal: numbers by which nothing is rounded.
+/// `None` where that component has no room for products, or is no number.
+#[inline(always)]
+pub(crate) fn scales(largest: f64) -> Option<(f64, f64)> {
+    // The exponent alone, which is not that of 0, of a denormal, of infinity or of what is not a number.
+    let exponent = largest.to_bits() & EXPONENT;
+    if exponent.wrapping_sub(512 << 52) > 1022 << 52 {
+        return None;
+    }
+    // Exact: the biased exponents of the two add up to twice the bias.
+    Some((f64::from_bits(exponent), f64::from_bits((2046 << 52) - exponent)))
+}
+
+/// [`LocalRay::shift`] and [`LocalRay::off`] of a ray that is far from its object; the origin is given relative to the centre.
+#[cold]
+#[inline(never)]
+pub(crate) fn far(relative: DVec3, direction: DVec3, half: f64) -> (f64, f64) {
+    // From the point nearest to the centre back by the size of the box, which is more than half its diagonal.
+    let shift = -relative.dot(direction) / direction.dot(direction) - 2.0 * half;
+    // Components of the direction are below 2. The f64 tests see the object from the true origin, with some more
+    // roundings of the same size.
+    (shift, shift.abs() * (32.0 * f64::UNIT_ROUNDOFF))
+}
+
+/// See [`LocalRay::most`].
+#[inline(always)]
+pub(crate) fn most(farthest: f64, magnitude: f64, off: f64) -> f64 {
+    // The moved origin is no larger than its distance and the centre.
+    farthest * (9.1 * U) + (magnitude * (1.1 * U) + off)
+}
+
+/// See [`LocalRay::delta`].
 #[inline(always)]
 pub(crate) fn delta(farthest: f64, magnitude: f64, off: f64) -> f64 {
-    let most = farthest * (9.1 * U) + (magnitude * (1.1 * U) + off);
     // Four more u|o|: for rounding the origin, adding this to it, multiplying it with the reciprocal (where the
     // test does so), and to spare. And four uR for the two roundings of the wide tree's test, which are relative to
     // the distance.
-    most * 8.0 + (farthest + magnitude) * (12.0 * U) + TINY
+    most(farthest, magnitude, off) * 8.0 + (farthest + magnitude) * (12.0 * U) + TINY
 }
 
 /// `t` (local, counted from the true origin) as an end of the box tests' interval, on the side where no box is missed.
@@ -196,32 +226,21 @@ impl LocalRay {
         let Extent { center, magnitude, half } = *object;
         let origin = transform.point_to_object(ray.origin);
         let direction = transform.vector_to_object(ray.direction);
-        // The power of two below the largest component: its exponent alone, which is not that of 0, of a denormal, of
-        // infinity or of what is not a number.
-        let exponent = largest(direction).to_bits() & EXPONENT;
+        let (length, unit) = scales(largest(direction))?;
         // Times 0, what is not finite is not a number.
         let nothing = (origin * 0.0 + direction * 0.0).dot(DVec3::ONE);
-        if exponent.wrapping_sub(512 << 52) > 1022 << 52 || nothing.is_nan() {
+        if nothing.is_nan() {
             return None;
         }
-        let length = f64::from_bits(exponent);
-        // Exact: the biased exponents of the two add up to twice the bias.
-        let unit = f64::from_bits((2046 << 52) - exponent);
         let direction = direction * unit;
         let relative = origin - center;
         let (mut moved, mut shift, mut off) = (origin, 0.0, 0.0);
         let mut farthest = largest(relative) + half;
         if farthest > (FAR + 1.0) * half {
-            // From the point nearest to the centre back by the size of the box, which is more than half its diagonal.
-            shift = -relative.dot(direction) / direction.dot(direction) - 2.0 * half;
-            // Components of the direction are below 2. The f64 tests see the object from the true origin, with some more
-            // roundings of the same size.
-            off = shift.abs() * (32.0 * f64::UNIT_ROUNDOFF);
+            (shift, off) = far(relative, direction, half);
             moved = origin + direction * shift;
             farthest = largest(moved - center) + half;
         }
-        // The moved origin is no larger than its distance and the centre.
-        let most = farthest * (9.1 * U) + (magnitude * (1.1 * U) + off);
         Some(Self {
             origin,
             direction,
@@ -231,7 +250,7 @@ impl LocalRay {
             world: [ray.t_min, ray.t_max],
             off,
             farthest,
-            most,
+            most: most(farthest, magnitude, off),
             delta: delta(farthest, magnitude, off).to_f32(),
             t_min: ray.t_min * length,
             span: farthest + 2.0 * shift.abs(),

@@ -4,7 +4,7 @@ use firsthit_geometry::{Ray, Real, transform::Transform};
 use glam::{DMat3, DVec3, Vec3};
 
 use super::vectors::{self, Vectors};
-use crate::local::{Extent, FAR, LocalRay, TINY, U, box_t};
+use crate::local::{Extent, FAR, LocalRay, TINY, U, box_t, most};
 use crate::simd::{Eight, Lanes};
 use crate::wide::{Boxes, SMALLEST, kept_near};
 
@@ -279,7 +279,7 @@ impl Group {
             world: [self.t_min[lane], self.t_max[lane]],
             off,
             farthest: self.farthest[lane],
-            most: self.farthest[lane] * (9.1 * U) + (magnitude * (1.1 * U) + off),
+            most: most(self.farthest[lane], magnitude, off),
             delta: self.delta[lane],
             t_min: self.local_t_min[lane],
             span: self.span[lane],

@@ -60,28 +60,23 @@ impl Four for Quad {
     }
 }
 
-#[allow(clippy::undocumented_unsafe_blocks, reason = "one reason for all, above")]
-impl OfFour for Avx2 {
-    type Four = Quad;
-    #[inline(always)]
-    fn narrow_four(x: Quad) -> Self {
-        unsafe { Self(_mm256_zextps128_ps256(_mm256_cvtpd_ps(x.0))) }
-    }
-    #[inline(always)]
-    fn reordered(self, lanes: &[u32; 8]) -> Self {
-        unsafe { Self(_mm256_permutevar8x32_ps(self.0, _mm256_loadu_si256(lanes.as_ptr().cast()))) }
-    }
+/// Alike with AVX2 and with AVX-512VL.
+macro_rules! of_four {
+    ($lanes:ident) => {
+        #[allow(clippy::undocumented_unsafe_blocks, reason = "one reason for all, above")]
+        impl OfFour for $lanes {
+            type Four = Quad;
+            #[inline(always)]
+            fn narrow_four(x: Quad) -> Self {
+                unsafe { Self(_mm256_zextps128_ps256(_mm256_cvtpd_ps(x.0))) }
+            }
+            #[inline(always)]
+            fn reordered(self, lanes: &[u32; 8]) -> Self {
+                unsafe { Self(_mm256_permutevar8x32_ps(self.0, _mm256_loadu_si256(lanes.as_ptr().cast()))) }
+            }
+        }
+    };
 }
 
-#[allow(clippy::undocumented_unsafe_blocks, reason = "one reason for all, above")]
-impl OfFour for Avx512 {
-    type Four = Quad;
-    #[inline(always)]
-    fn narrow_four(x: Quad) -> Self {
-        unsafe { Self(_mm256_zextps128_ps256(_mm256_cvtpd_ps(x.0))) }
-    }
-    #[inline(always)]
-    fn reordered(self, lanes: &[u32; 8]) -> Self {
-        unsafe { Self(_mm256_permutevar8x32_ps(self.0, _mm256_loadu_si256(lanes.as_ptr().cast()))) }
-    }
-}
+of_four!(Avx2);
+of_four!(Avx512);

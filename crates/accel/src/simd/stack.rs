@@ -144,17 +144,12 @@ impl Top<'_, u64> {
         }
     }
 
-    /// Puts one on top.
+    /// Puts these on top, the last of them topmost.
     ///
     /// # Panics
     /// As [`Top::push`].
     #[inline(always)]
-    pub(crate) fn push_one(self, key: u64) {
-        self.put([key]);
-    }
-
-    #[inline(always)]
-    fn put<const N: usize>(self, keys: [u64; N]) {
+    pub(crate) fn put<const N: usize>(self, keys: [u64; N]) {
         let len = *self.len;
         assert!(len + N <= self.entries.len(), "trees are not so deep");
         for (slot, key) in self.entries[len..len + N].iter_mut().zip(keys) {

@@ -4,7 +4,8 @@
 use firsthit_geometry::{Ray, Real, transform::Transform};
 use glam::DVec3;
 
-use crate::local::{EXPONENT, Extent, FAR, Line, U, delta};
+use crate::local::{Extent, FAR, Line, U, delta, far, scales};
+use crate::scene::is_interval;
 use crate::simd::{Four, Lanes};
 
 /// A ray in an object's normalised space. What is the same as in a [`LocalRay`](crate::local::LocalRay) has the same bits:
@@ -34,14 +35,6 @@ fn three<F: Four>(v: F) -> DVec3 {
     DVec3::new(x, y, z)
 }
 
-/// By how much the origin is moved along the line if it is far, and how far that may have rounded it off.
-#[cold]
-#[inline(never)]
-fn far(relative: DVec3, direction: DVec3, half: f64) -> (f64, f64) {
-    let shift = -relative.dot(direction) / direction.dot(direction) - 2.0 * half;
-    (shift, shift.abs() * (32.0 * f64::UNIT_ROUNDOFF))
-}
-
 impl<L: Lanes> Entered<L> {
     /// `None` as of [`LocalRay::enter`](crate::local::LocalRay::enter), and for an interval that is none.
     #[inline(always)]
@@ -57,12 +50,10 @@ impl<L: Lanes> Entered<L> {
         };
         let most = L::Four::splat(f64::MAX);
         let finite = origin.abs().le(most) & direction.abs().le(most);
-        let exponent = direction.abs().largest().to_bits() & EXPONENT;
-        let roomy = exponent.wrapping_sub(512 << 52) <= 1022 << 52;
-        if !(finite & 7 == 7 && roomy && ray.t_min <= ray.t_max) {
+        if !(finite & 7 == 7 && is_interval(ray)) {
             return None;
         }
-        let (t_scale, t_unscale) = (f64::from_bits(exponent), f64::from_bits((2046 << 52) - exponent));
+        let (t_scale, t_unscale) = scales(direction.abs().largest())?;
         let direction = direction.mul(L::Four::splat(t_unscale));
         let line = three(direction);
         let (mut moved, mut shift, mut off) = (origin, 0.0, 0.0);

@@ -78,7 +78,7 @@ pub(crate) fn traverse<L: Lanes, T: WideTree, F: Filter<L>, P: Probe, const ORDE
                 let a = u64::from(enter[i].to_bits()) << 32 | u64::from(below[i]);
                 let b = u64::from(enter[j].to_bits()) << 32 | u64::from(below[j]);
                 current = Reference(a.min(b) as u32);
-                keys.top().push_one(a.max(b));
+                keys.top().put([a.max(b)]);
                 if large {
                     tree.prefetch(Reference(a.max(b) as u32));
                 }

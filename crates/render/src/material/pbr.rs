@@ -252,9 +252,12 @@ impl Pbr {
     /// The share of its roughness that blurs what is seen through it. Facets of an index of 1 bend nothing, so those of a
     /// solid blur nothing either; of a sheet they blur by how far its index is from 1, up to that of glass.
     fn blur(&self) -> f32 {
-        match self.is_solid() {
-            true => f32::from(u8::from(self.bends())),
-            false => (2.0 * (self.ior - 1.0).abs()).min(1.0),
+        if !self.is_solid() {
+            (2.0 * (self.ior - 1.0).abs()).min(1.0)
+        } else if self.bends() {
+            1.0
+        } else {
+            0.0
         }
     }
 
