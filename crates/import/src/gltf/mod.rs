@@ -29,6 +29,7 @@ mod json;
 mod layers;
 mod material;
 mod mesh;
+mod meshopt;
 mod node;
 mod source;
 mod tangent;

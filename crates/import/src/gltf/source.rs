@@ -1,12 +1,14 @@
 //! A glTF file with its buffers: what all other modules here read from.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 
 use gltf::json::{Index, Root, buffer};
 
 use super::accessor::ZeroBudget;
+use super::meshopt::{self, Compressed};
 use super::uri::{self, Uri};
 use crate::files::{self, Folder};
 use crate::{ErrorKind, ImportError, Limits, Report};
@@ -20,13 +22,15 @@ pub(super) struct Source<'a> {
     pub(super) zeros: ZeroBudget,
     /// `None`: the file gives no data (a fallback of a compressed buffer).
     buffers: Vec<Option<Cow<'a, [u8]>>>,
+    /// The buffer views that were compressed, by their numbers.
+    decompressed: BTreeMap<usize, Vec<u8>>,
 }
 
 impl<'a> Source<'a> {
-    /// Reads the buffers.
+    /// Reads the buffers and decompresses buffer views.
     ///
     /// # Errors
-    /// If a buffer is not there, or shorter than it says.
+    /// If a buffer is not there, or shorter than it says; if a compressed buffer view is damaged.
     pub(super) fn new(
         file: &'a Path,
         root: &'a Root,
@@ -35,11 +39,15 @@ impl<'a> Source<'a> {
         report: &mut Report,
     ) -> Result<Self, ImportError> {
         let (folder, zeros) = (Folder::of(file)?, ZeroBudget::new(limits));
-        let mut source = Self { file, root, folder, limits, zeros, buffers: Vec::new() };
+        let (buffers, decompressed) = (Vec::new(), BTreeMap::new());
+        let mut source = Self { file, root, folder, limits, zeros, buffers, decompressed };
+        let compressed = Compressed::all(&source)?;
+        let fallback = meshopt::unread_buffers(root, &compressed);
         let mut total = 0_u64;
         for (i, buffer) in root.buffers.iter().enumerate() {
             let place = format!("/buffers/{i}");
             let bytes = match (&buffer.uri, bin) {
+                _ if fallback[i] => None,
                 (Some(uri), _) => Some(Cow::Owned(source.resource(uri, &format!("{place}/uri"), limits, report)?)),
                 (None, Some(bin)) if i == 0 => Some(Cow::Borrowed(bin)),
                 (None, _) => None,
@@ -56,6 +64,7 @@ impl<'a> Source<'a> {
             }
             source.buffers.push(bytes);
         }
+        source.decompressed = meshopt::decompress(&source, &compressed, limits.decompressed(total))?;
         Ok(source)
     }
 
@@ -86,12 +95,28 @@ impl<'a> Source<'a> {
     /// If it leaves its buffer, or the buffer has no data.
     pub(super) fn view(&self, index: Index<buffer::View>) -> Result<&[u8], ImportError> {
         let range = self.check_view(index)?;
+        if let Some(bytes) = self.decompressed.get(&index.value()) {
+            return Ok(bytes);
+        }
         let buffer = self.root.buffer_views[index.value()].buffer.value();
+        self.buffer(buffer, range, || format!("/bufferViews/{}/buffer", index.value()))
+    }
+
+    /// Bytes of a buffer, which lie in what it says to have; `place` is where it is named.
+    ///
+    /// # Errors
+    /// If the buffer has no data.
+    pub(super) fn buffer(
+        &self,
+        buffer: usize,
+        range: Range<usize>,
+        place: impl FnOnce() -> String,
+    ) -> Result<&[u8], ImportError> {
         // The buffer has at least the bytes that it says.
         self.buffers[buffer].as_ref().map(|bytes| &bytes[range]).ok_or_else(|| {
             let cause =
                 format!("buffer {buffer} has no data: neither a URI nor, as the first of a GLB, a binary chunk");
-            self.invalid(format!("/bufferViews/{}/buffer", index.value()), cause)
+            self.invalid(place(), cause)
         })
     }
 
@@ -101,14 +126,27 @@ impl<'a> Source<'a> {
     /// If it leaves its buffer.
     pub(super) fn check_view(&self, index: Index<buffer::View>) -> Result<Range<usize>, ImportError> {
         let view = &self.root.buffer_views[index.value()];
-        let available = self.root.buffers[view.buffer.value()].byte_length.0;
         let (start, length) = (view.byte_offset.map_or(0, |o| o.0), view.byte_length.0);
+        self.range(view.buffer.value(), start, length, || format!("/bufferViews/{}", index.value()))
+    }
+
+    /// So many bytes of a buffer; `place` is where they are asked for.
+    ///
+    /// # Errors
+    /// If they leave the buffer.
+    pub(super) fn range(
+        &self,
+        buffer: usize,
+        start: u64,
+        length: u64,
+        place: impl FnOnce() -> String,
+    ) -> Result<Range<usize>, ImportError> {
+        let available = self.root.buffers[buffer].byte_length.0;
         match start.checked_add(length).filter(|&end| end <= available) {
             Some(end) => Ok(start as usize..end as usize),
             None => {
-                let buffer = view.buffer.value();
                 let cause = format!("{length} bytes from byte {start} leave buffer {buffer}, which has {available}");
-                Err(self.invalid(format!("/bufferViews/{}", index.value()), cause))
+                Err(self.invalid(place(), cause))
             }
         }
     }
