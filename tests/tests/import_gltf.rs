@@ -683,8 +683,13 @@ fn images_are_decoded_from_files_views_and_data_uris() {
 #[test]
 fn extensions_are_reported_and_required_ones_refused_by_name() {
     let Some(shared) = firsthit_tests::shared() else { return };
-    let error = read(&shared.join("assets/chess-board/chess-board.glb")).unwrap_err();
-    assert!(matches!(&error.kind, ErrorKind::Unsupported(c) if c.contains("KHR_draco_mesh_compression")), "{error}");
+    let report = read(&shared.join("assets/chess-board/chess-board.glb")).unwrap().report;
+    let used = report.extensions.iter().find(|e| e.name == "KHR_draco_mesh_compression").unwrap();
+    assert_eq!((used.support, used.required), (Support::Full, true));
+    let mut file = one_triangle(&json!([{"mesh": 0}]));
+    file["extensionsRequired"] = json!(["EXT_lights_ies"]);
+    let error = of_json(&file, &Options::default()).unwrap_err();
+    assert!(matches!(&error.kind, ErrorKind::Unsupported(c) if c.contains("EXT_lights_ies")), "{error}");
     let report = read(&shared.join("assets/gpu-instancing-teapots/teapots_galore.gltf")).unwrap().report;
     let used = report.extensions.iter().find(|e| e.name == "EXT_mesh_gpu_instancing").unwrap();
     assert_eq!((used.support, used.required), (Support::Unsupported, false));

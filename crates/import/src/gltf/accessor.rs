@@ -94,12 +94,7 @@ impl Layout {
         };
         let component = component.0;
         let count = json.count.0;
-        let limit = if json.buffer_view.is_some() { u64::MAX } else { MOST_ZEROS };
-        let limit = limit.min(source.limits.elements);
-        if count > limit {
-            let cause = format!("{count} elements are more than the limit of {limit}");
-            return Err(source.at(place + "/count", ErrorKind::Limit(cause)));
-        }
+        check_count(source, index, source.limits.elements)?;
         let (size, pitch) = element_size(kind, component);
         let data = match json.buffer_view {
             Some(view) => {
@@ -178,6 +173,7 @@ impl<'a> Accessor<'a> {
     pub(super) fn new(source: &'a Source<'_>, index: Index<json::Accessor>) -> Result<Self, ImportError> {
         let Layout { count, kind, format, data, sparse } = Layout::new(source, index)?;
         if data.is_none() {
+            check_count(source, index, MOST_ZEROS)?;
             let bytes = count.saturating_mul(element_size(kind, ComponentType::F32).1);
             let Some(left) = source.zeros.0.get().checked_sub(bytes) else {
                 let cause = "accessors without data are read so often that their zeros would take too much memory";
@@ -188,6 +184,12 @@ impl<'a> Accessor<'a> {
         let data = data.map(|d| d.data(source)).transpose()?;
         let sparse = sparse.map(|s| Sparse::new(source, &s, count)).transpose()?;
         Ok(Self { count: count as usize, kind, format, data, sparse })
+    }
+
+    /// Elements one after the other; `bytes` must have so many.
+    pub(super) fn packed(count: usize, kind: Type, format: Format, bytes: &'a [u8]) -> Self {
+        let stride = kind.multiplicity() * format.0.size();
+        Self { count, kind, format, data: Some(Strided { bytes, stride }), sparse: None }
     }
 
     /// Vectors of `N` floats, normalised integers unpacked as the specification's section 3.11 says.
@@ -263,6 +265,15 @@ impl<'a> Sparse<'a> {
         }
         Ok(Self { places, values: layout.values.data(source)? })
     }
+}
+
+fn check_count(source: &Source<'_>, index: Index<json::Accessor>, limit: u64) -> Result<(), ImportError> {
+    let count = source.root.accessors[index.value()].count.0;
+    if count > limit {
+        let cause = format!("{count} elements are more than the limit of {limit}");
+        return Err(source.at(format!("/accessors/{}/count", index.value()), ErrorKind::Limit(cause)));
+    }
+    Ok(())
 }
 
 /// Bytes from one element to the next.

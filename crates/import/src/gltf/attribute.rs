@@ -8,6 +8,7 @@ use gltf::json::{self, Index};
 
 use super::accessor::{Accessor, Format};
 use super::bake::Influence;
+use super::draco::DracoPrimitive;
 use super::source::Source;
 use crate::{ImportError, Report};
 
@@ -43,6 +44,8 @@ pub(super) struct Attributes<'a> {
     pub(super) quantized: bool,
     /// How many vertices there are, once that is known.
     pub(super) count: Option<usize>,
+    /// What is not in the accessors, but in a compressed stream.
+    pub(super) draco: Option<&'a DracoPrimitive>,
 }
 
 impl Attributes<'_> {
@@ -95,7 +98,10 @@ impl Attributes<'_> {
 
     /// Indices of vertices, in range. The largest number of the type, which would restart a primitive, is an error.
     pub(super) fn indices(&self, index: Index<json::Accessor>, vertices: usize) -> Values<u32> {
-        let accessor = Accessor::new(self.source, index)?;
+        let accessor = match self.draco.and_then(|d| d.indices()) {
+            Some(unpacked) => unpacked,
+            None => Accessor::new(self.source, index)?,
+        };
         let place = format!("{}/indices", self.place);
         if accessor.kind != Type::Scalar || !INDICES.contains(&accessor.format) {
             return Err(self.source.invalid(place, format!("expected SCALAR of {}", names(INDICES))));
@@ -124,7 +130,11 @@ impl Attributes<'_> {
         kinds: &[Type],
         formats: &[Format],
     ) -> Result<Accessor<'_>, ImportError> {
-        let accessor = Accessor::new(self.source, index)?;
+        let name = at.strip_prefix("attributes/");
+        let accessor = match name.and_then(|name| self.draco?.attribute(name)) {
+            Some(unpacked) => unpacked,
+            None => Accessor::new(self.source, index)?,
+        };
         let place = || format!("{}/{at}", self.place);
         if !kinds.contains(&accessor.kind) || !formats.contains(&accessor.format) {
             let cause = format!(

@@ -39,7 +39,7 @@ pub const EXTENSIONS: &[Extension] = &[
     entry("FB_ngon_encoding", Ignored, "the triangles are the same"),
     entry("GODOT_single_root", Ignored, "a hint for editors"),
     entry("KHR_animation_pointer", Ignored, "the rest pose is shown"),
-    entry("KHR_draco_mesh_compression", Unsupported, "the uncompressed fallback is read where the file has one"),
+    entry("KHR_draco_mesh_compression", Full, ""),
     entry("KHR_interactivity", Ignored, "the rest pose is shown"),
     entry("KHR_lights_punctual", Full, ""),
     entry("KHR_materials_anisotropy", Full, ""),

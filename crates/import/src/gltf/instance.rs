@@ -43,7 +43,7 @@ pub(super) fn place(
             shown_by.entry(mesh.value()).or_default().push((node, placement(source, node)));
         }
     }
-    let mut reader = MeshReader::new(source, variant);
+    let mut reader = MeshReader::new(source, variant)?;
     // By node, since instances are in the order of nodes, not of meshes.
     let mut placed: BTreeMap<usize, (usize, DAffine3)> = BTreeMap::new();
     for (i, json) in source.root.meshes.iter().enumerate() {

@@ -8,6 +8,7 @@ use gltf::json::{self, Index};
 
 use super::attribute::Attributes;
 use super::bake::Influence;
+use super::draco::DracoPrimitives;
 use super::source::Source;
 use super::tangent;
 use super::variant;
@@ -35,6 +36,7 @@ pub(super) struct NormalMapping {
 pub(super) struct MeshReader<'a> {
     source: &'a Source<'a>,
     quantized: bool,
+    draco: DracoPrimitives,
     variant: Option<u32>,
     /// Vertices read, those of shared arrays each time.
     read: u64,
@@ -73,9 +75,13 @@ const MOST_SETS: u32 = 8;
 
 impl<'a> MeshReader<'a> {
     /// Materials are those of a variant, if one is given.
-    pub(super) fn new(source: &'a Source<'a>, variant: Option<u32>) -> Self {
+    ///
+    /// # Errors
+    /// If a compressed primitive cannot be decoded.
+    pub(super) fn new(source: &'a Source<'a>, variant: Option<u32>) -> Result<Self, ImportError> {
         let quantized = source.uses("KHR_mesh_quantization");
-        Self { source, quantized, variant, read: 0, vertices: 0, triangles: 0 }
+        let draco = DracoPrimitives::new(source)?;
+        Ok(Self { source, quantized, draco, variant, read: 0, vertices: 0, triangles: 0 })
     }
 
     /// Reads the primitives of a mesh that make triangles, with its morph targets by `weights` (the mesh's own where
@@ -93,30 +99,35 @@ impl<'a> MeshReader<'a> {
         let weights = weights.or(json.weights.as_deref()).unwrap_or_default();
         let mut primitives = Vec::new();
         for (number, primitive) in json.primitives.iter().enumerate() {
-            let place = format!("/meshes/{}/primitives/{number}", mesh.value());
-            primitives.extend(self.primitive(number, place, primitive, weights, report)?);
+            primitives.extend(self.primitive(mesh.value(), number, primitive, weights, report)?);
         }
         Ok(primitives)
     }
 
     fn primitive(
         &mut self,
+        mesh: usize,
         number: usize,
-        place: String,
         json: &json::mesh::Primitive,
         weights: &[f32],
         report: &mut Report,
     ) -> Result<Option<Primitive>, ImportError> {
         use Semantic::{Colors, Joints, Normals, Positions, Tangents, TexCoords, Weights};
         let source = self.source;
-        let Checked::Valid(mode) = json.mode else {
-            return Err(source.invalid(place + "/mode", "is no topology of glTF (0 to 6)"));
+        let place = format!("/meshes/{mesh}/primitives/{number}");
+        let draco = self.draco.get(mesh, number);
+        let mode = match json.mode {
+            // What is compressed comes out as separate triangles, also if it was a strip.
+            Checked::Valid(_) if draco.is_some() => Mode::Triangles,
+            Checked::Valid(mode) => mode,
+            Checked::Invalid => return Err(source.invalid(place + "/mode", "is no topology of glTF (0 to 6)")),
         };
         let Some(&positions) = json.attributes.get(&Checked::Valid(Positions)) else {
             report.warn(source.file, place, "has no POSITION: nothing to draw");
             return Ok(None);
         };
-        let mut attributes = Attributes { source, place: &place, report, quantized: self.quantized, count: None };
+        let quantized = self.quantized;
+        let mut attributes = Attributes { source, place: &place, report, quantized, count: None, draco };
         let positions = attributes.positions(positions, "attributes/POSITION")?;
         let count = positions.len();
         attributes.count = Some(count);

@@ -22,6 +22,7 @@ mod accessor;
 mod attribute;
 mod bake;
 mod camera_light;
+mod draco;
 mod extensions;
 mod glb;
 mod instance;

@@ -151,6 +151,11 @@ impl<'a> Source<'a> {
         }
     }
 
+    /// How many bytes the buffers have.
+    pub(super) fn bytes(&self) -> u64 {
+        self.buffers.iter().flatten().map(|b| b.len() as u64).sum()
+    }
+
     /// An error at a place in the file.
     pub(super) fn at(&self, place: impl Into<String>, kind: ErrorKind) -> ImportError {
         ImportError::new(self.file, place, kind)
