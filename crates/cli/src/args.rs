@@ -16,6 +16,7 @@ use glam::DVec3;
 use crate::accuracy::AccuracyArgs;
 use crate::bench::BenchArgs;
 use crate::compare::CompareArgs;
+use crate::query::QueryArgs;
 use crate::values::{self, AovList, Color, Explain, Hdri, Plane, Resolution, Switch};
 
 const EXAMPLES: &str = "\
@@ -24,6 +25,7 @@ Examples:
   firsthit render scan.obj --up +Z -o scan.exr --aov depth,normal
   firsthit render chair.glb --camera-azimuth-angle 40 --resolution 1920x1080 --spp 64
   firsthit inspect helmet.glb --json                what is in the file
+  firsthit query closest helmet.glb --rays rays.csv what each ray meets first
   firsthit completions bash > /etc/bash_completion.d/firsthit
 
 Exit codes: 0 done, 1 loading or rendering failed, 2 wrong usage, 130 interrupted.";
@@ -80,6 +82,8 @@ pub(crate) enum Command {
     Render(Box<RenderArgs>),
     /// Say what is in a model: triangles, materials, cameras, extensions, effects, quality.
     Inspect(InspectArgs),
+    /// Answer rays from a file: what they meet first, whether, how often, or everything.
+    Query(QueryArgs),
     /// Measure what accuracy costs in time, and check the hard cases.
     Accuracy(AccuracyArgs),
     /// Measure how fast builds and queries are, obvhs's own traversals beside them.
@@ -96,7 +100,7 @@ pub(crate) enum Command {
     /// Print a manual page (roff).
     Man {
         /// The page of one command instead of the program's.
-        #[arg(value_parser = ["render", "inspect", "merge", "accuracy", "bench", "compare", "completions", "man"])]
+        #[arg(value_parser = ["render", "inspect", "query", "merge", "accuracy", "bench", "compare", "completions", "man"])]
         command: Option<String>,
     },
 }

@@ -14,6 +14,7 @@ mod interrupt;
 mod measured;
 mod merge;
 mod progress;
+mod query;
 mod render;
 mod report;
 mod simd;
@@ -44,6 +45,7 @@ fn run(command: Command, config: Option<&std::path::Path>) -> Result<Exit, Failu
     match command {
         Command::Render(args) => render::run(&args, config),
         Command::Inspect(args) => inspect::run(&args).map(|()| Exit::Done),
+        Command::Query(args) => query::run(&args),
         Command::Accuracy(args) => accuracy::run(&args),
         Command::Bench(args) => bench::run(&args),
         Command::Compare(args) => compare::run(&args).map(|()| Exit::Done),

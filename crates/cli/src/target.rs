@@ -33,13 +33,7 @@ impl Target {
 
     /// Refuses if writing would replace one of the files that were read.
     pub(crate) fn spare<'a>(&self, aovs: &[Aov], read: impl Iterator<Item = &'a Path>) -> Result<(), Failure> {
-        match replaced(&self.files(aovs)?, read) {
-            Some(file) => {
-                let failure = format_args!("{}: the model was read from this file too", file.display());
-                Err(Failure::failed(failure).hint("write to another file: -o FILE"))
-            }
-            None => Ok(()),
-        }
+        spare(&self.files(aovs)?, read)
     }
 
     /// The files that an image with these pictures beside it is written to.
@@ -94,6 +88,21 @@ pub(crate) fn writable(path: &Path) -> Result<(), Failure> {
         return Err(failure.hint(format_args!("mkdir -p {}", folder.display())));
     }
     output::try_path(path).map_err(Failure::failed)
+}
+
+/// Refuses to write a file that is one of those that are read.
+pub(crate) fn spare_file<'a>(path: &Path, read: impl Iterator<Item = &'a Path>) -> Result<(), Failure> {
+    spare(&[path.to_owned()], read)
+}
+
+fn spare<'a>(written: &[PathBuf], read: impl Iterator<Item = &'a Path>) -> Result<(), Failure> {
+    match replaced(written, read) {
+        Some(file) => {
+            let failure = format_args!("{}: this file is read too", file.display());
+            Err(Failure::failed(failure).hint("write to another file: -o FILE"))
+        }
+        None => Ok(()),
+    }
 }
 
 /// The first of some files to be written that is one of those that are read. What does not exist yet replaces nothing.

@@ -702,7 +702,7 @@ fn completions_and_manual_come_from_the_same_definitions() {
     assert!(manual.contains(".TH") && manual.contains("render"));
     let page = folder.run(&["man", "render"]).code(0).stdout();
     assert!(page.contains("\\-\\-camera\\-focal\\-point") && page.contains("firsthit"));
-    for command in ["inspect", "accuracy", "bench", "completions", "man"] {
+    for command in ["inspect", "query", "accuracy", "bench", "completions", "man"] {
         assert!(folder.run(&["man", command]).code(0).stdout().contains(".TH"), "{command}");
     }
 }

@@ -5,7 +5,7 @@ mod hdr;
 mod png;
 
 use std::fs;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 pub use png::write_png;
@@ -169,19 +169,86 @@ fn failed(path: &Path) -> impl FnOnce(io::Error) -> OutputError {
 }
 
 /// Writes a file so that it appears whole or not at all.
-fn atomically(path: &Path, write: impl FnOnce(&mut BufWriter<fs::File>) -> io::Result<()>) -> io::Result<()> {
-    let temporary = temporary(path)?;
-    let result = (|| {
-        let mut out = BufWriter::new(fs::File::create(&temporary)?);
-        write(&mut out)?;
-        out.flush()?;
-        fs::rename(&temporary, path)
-    })();
-    if result.is_err() {
-        // What went wrong first is what the caller should hear of.
-        let _ = fs::remove_file(&temporary);
+fn atomically(path: &Path, write: impl FnOnce(&mut WholeFile) -> io::Result<()>) -> io::Result<()> {
+    let mut out = WholeFile::create(path)?;
+    write(&mut out)?;
+    out.finish()
+}
+
+/// A file that appears whole or not at all: it is written under another name in the same folder, which
+/// [`WholeFile::finish`] renames. Dropped before that, it leaves nothing behind.
+///
+/// ```
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("rows.csv");
+/// use std::io::Write;
+/// let mut file = firsthit_render::output::WholeFile::create(&path)?;
+/// writeln!(file, "1,2,3")?;
+/// assert!(!path.exists());
+/// file.finish()?;
+/// assert!(path.exists());
+/// # Ok::<(), std::io::Error>(())
+/// ```
+#[derive(Debug)]
+pub struct WholeFile {
+    out: BufWriter<fs::File>,
+    temporary: PathBuf,
+    path: PathBuf,
+    finished: bool,
+}
+
+impl WholeFile {
+    /// Begins a file. One of that name stays as it is until the end.
+    ///
+    /// # Errors
+    /// When the path names no file, or the folder cannot be written to.
+    pub fn create(path: &Path) -> io::Result<Self> {
+        let temporary = temporary(path)?;
+        let out = BufWriter::new(fs::File::create(&temporary)?);
+        Ok(Self { out, temporary, path: path.to_owned(), finished: false })
     }
-    result
+
+    /// Where it is until it is finished: what a program that is interrupted should remove.
+    #[must_use]
+    pub fn temporary(&self) -> &Path {
+        &self.temporary
+    }
+
+    /// Gives the file its name.
+    ///
+    /// # Errors
+    /// When the rest cannot be written, or the file not be renamed. Then nothing is left behind.
+    pub fn finish(mut self) -> io::Result<()> {
+        self.out.flush()?;
+        fs::rename(&self.temporary, &self.path)?;
+        self.finished = true;
+        Ok(())
+    }
+}
+
+impl Write for WholeFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.out.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+}
+
+impl Seek for WholeFile {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.out.seek(to)
+    }
+}
+
+impl Drop for WholeFile {
+    fn drop(&mut self) {
+        if !self.finished {
+            // What went wrong first is what the caller should hear of.
+            let _ = fs::remove_file(&self.temporary);
+        }
+    }
 }
 
 /// Where a file is written before it is renamed to `path`: in the same folder.

@@ -17,7 +17,7 @@ use crate::{View, ViewTransform};
 /// When `out` fails or the picture has no pixels.
 pub fn write_png(out: &mut impl Write, picture: &Picture, view: &View, depth: BitDepth) -> io::Result<()> {
     let opaque = view.backdrop.is_some() || picture.pixels.iter().all(|p| p[3] >= 1.0);
-    let values = picture.pixels.iter().map(|p| shown(Vec4::from(*p), view));
+    let values = picture.shown(view);
     let channels = if opaque { 3 } else { 4 };
 
     let mut encoder = png::Encoder::new(out, picture.width, picture.height);
@@ -42,7 +42,13 @@ pub fn write_png(out: &mut impl Write, picture: &Picture, view: &View, depth: Bi
     writer.finish().map_err(other)
 }
 
-/// Display colour and straight alpha, all in [0, 1].
+impl Picture {
+    /// What a display shows, pixel by pixel from the upper left: colour and straight alpha, all in [0, 1].
+    pub fn shown(&self, view: &View) -> impl Iterator<Item = [f32; 4]> {
+        self.pixels.iter().map(|p| shown(Vec4::from(*p), view))
+    }
+}
+
 fn shown(pixel: Vec4, view: &View) -> [f32; 4] {
     let alpha = pixel.w.clamp(0.0, 1.0);
     let color = if pixel.w > 0.0 { pixel.truncate() / pixel.w } else { Vec3::ZERO };
