@@ -1,4 +1,5 @@
-//! Images of textures and environments: PNG, JPEG, WebP, Radiance HDR and OpenEXR, told by their first bytes.
+//! Images of textures and environments: PNG, JPEG, WebP, KTX2 (Basis Universal), Radiance HDR and OpenEXR, told by
+//! their first bytes.
 //!
 //! Size is checked from the header before a pixel is decoded. A damaged image does not stop a load: readers warn and
 //! go on without it.
@@ -12,7 +13,7 @@ use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 use rayon::prelude::*;
 
 use crate::scene::{ImageDesc, Pixels};
-use crate::{ErrorKind, ImportError, Limits, files};
+use crate::{ErrorKind, ImportError, Limits, files, ktx2};
 
 /// An image that is still encoded.
 #[derive(Clone, Copy, Debug)]
@@ -43,7 +44,13 @@ pub fn read(path: impl AsRef<Path>, limits: &Limits) -> Result<ImageDesc, Import
 pub fn decode(bytes: &[u8], name: &str, limits: &Limits) -> Result<ImageDesc, ErrorKind> {
     let size = Size::of(bytes, limits)?;
     size.check(limits.image_bytes)?;
-    let (width, height, pixels) = if is_exr(bytes) { decode_exr(bytes)? } else { decode_common(bytes, limits)? };
+    let (width, height, pixels) = if is_exr(bytes) {
+        decode_exr(bytes)?
+    } else if ktx2::is_ktx2(bytes) {
+        ktx2::decode(bytes)?
+    } else {
+        decode_common(bytes, limits)?
+    };
     Ok(ImageDesc { name: name.to_owned(), width, height, pixels })
 }
 
@@ -97,6 +104,9 @@ impl Size {
                 sizes.map(|s| s.height()).max().unwrap_or(0),
                 12,
             )
+        } else if ktx2::is_ktx2(bytes) {
+            let (width, height) = ktx2::size(bytes)?;
+            Self { width, height, bytes_per_pixel: 4 }
         } else {
             let decoder = decoder(bytes, limits)?;
             let (width, height) = decoder.dimensions();
@@ -141,8 +151,9 @@ fn is_exr(bytes: &[u8]) -> bool {
 }
 
 fn decoder<'a>(bytes: &'a [u8], limits: &Limits) -> Result<impl ImageDecoder + 'a, ErrorKind> {
-    let unsupported =
-        |what: &str| ErrorKind::Unsupported(format!("{what}; PNG, JPEG, WebP, Radiance HDR and OpenEXR are read"));
+    let unsupported = |what: &str| {
+        ErrorKind::Unsupported(format!("{what}; PNG, JPEG, WebP, KTX2, Radiance HDR and OpenEXR are read"))
+    };
     let format = image::guess_format(bytes).map_err(|_| unsupported("not an image of a known format"))?;
     if !matches!(format, ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::WebP | ImageFormat::Hdr) {
         return Err(unsupported(&format!("{} images are not read", format!("{format:?}").to_uppercase())));

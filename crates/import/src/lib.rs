@@ -16,6 +16,7 @@ mod error;
 mod files;
 pub mod gltf;
 pub mod image;
+mod ktx2;
 mod limits;
 pub mod obj;
 mod open;

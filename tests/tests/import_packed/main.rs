@@ -1,5 +1,6 @@
 //! Compressed and packed models against their plain twins in the public data.
 
+mod basisu;
 mod draco;
 mod meshopt;
 

@@ -23,6 +23,12 @@ const fn entry(name: &'static str, support: Support, note: &'static str) -> Exte
 
 use Support::{Full, Ignored, Unsupported};
 
+const BASISU: Extension = if cfg!(feature = "ktx2") {
+    entry("KHR_texture_basisu", Full, "")
+} else {
+    entry("KHR_texture_basisu", Unsupported, "the PNG or JPEG fallback is used where the file has one")
+};
+
 /// The extensions, by name.
 pub const EXTENSIONS: &[Extension] = &[
     entry("AGI_articulations", Ignored, "the rest pose is shown"),
@@ -61,7 +67,7 @@ pub const EXTENSIONS: &[Extension] = &[
     entry("KHR_node_hoverability", Ignored, "nothing is pointed at"),
     entry("KHR_node_selectability", Ignored, "nothing is pointed at"),
     entry("KHR_node_visibility", Full, ""),
-    entry("KHR_texture_basisu", Unsupported, "the PNG or JPEG fallback is used where the file has one"),
+    BASISU,
     entry("KHR_texture_transform", Full, ""),
     entry("KHR_xmp", Ignored, "data without effect on the picture"),
     entry("KHR_xmp_json_ld", Ignored, "data without effect on the picture"),

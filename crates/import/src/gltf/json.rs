@@ -158,9 +158,9 @@ pub(super) fn check_references(file: &Path, root: &Root) -> Result<(), ImportErr
         if t.source.value() != u32::MAX as usize {
             check.one(Some(t.source), root.images.len(), format_args!("/textures/{i}/source"))?;
         }
-        if let Some(webp) = webp_source(t) {
-            let place = format_args!("/textures/{i}/extensions/EXT_texture_webp/source");
-            check.one(Some(Index::<gltf::json::Image>::new(webp)), root.images.len(), place)?;
+        for name in IMAGE_EXTENSIONS {
+            let source = extension_source(t, name).map(Index::<gltf::json::Image>::new);
+            check.one(source, root.images.len(), format_args!("/textures/{i}/extensions/{name}/source"))?;
         }
     }
     for (i, m) in root.materials.iter().enumerate() {
@@ -214,9 +214,13 @@ pub(super) fn check_references(file: &Path, root: &Root) -> Result<(), ImportErr
     check.one(root.scene, root.scenes.len(), format_args!("/scene"))
 }
 
-/// The image that EXT_texture_webp offers for a texture; a number that is none leads nowhere.
-pub(super) fn webp_source(texture: &gltf::json::Texture) -> Option<u32> {
-    let source = texture.extensions.as_ref()?.others.get("EXT_texture_webp")?.get("source")?;
+/// The extensions that offer other images for a texture, the preferred one first.
+pub(super) const IMAGE_EXTENSIONS: &[&str] =
+    if cfg!(feature = "ktx2") { &["KHR_texture_basisu", "EXT_texture_webp"] } else { &["EXT_texture_webp"] };
+
+/// The image that an extension offers for a texture; a number that is none leads nowhere.
+pub(super) fn extension_source(texture: &gltf::json::Texture, name: &str) -> Option<u32> {
+    let source = texture.extensions.as_ref()?.others.get(name)?.get("source")?;
     Some(source.as_u64().and_then(|i| u32::try_from(i).ok()).unwrap_or(u32::MAX))
 }
 

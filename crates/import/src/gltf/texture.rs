@@ -78,8 +78,9 @@ impl<'a> Textures<'a> {
             let cause = format!("element {} does not exist: there are {}", info.index.value(), root.textures.len());
             return Err(self.source.invalid(format!("{place}/index"), cause));
         };
-        let shown = match (json::webp_source(texture), texture.source.value()) {
-            (Some(webp), _) => Shown::Image(self.same[webp as usize]),
+        let better = json::IMAGE_EXTENSIONS.iter().find_map(|name| json::extension_source(texture, name));
+        let shown = match (better, texture.source.value()) {
+            (Some(better), _) => Shown::Image(self.same[better as usize]),
             // The JSON model's mark for "no source".
             (None, source) if source == u32::MAX as usize => Shown::Nothing { texture: info.index.value() },
             (None, source) => Shown::Image(self.same[source]),
