@@ -2,6 +2,7 @@
 
 mod basisu;
 mod draco;
+mod instancing;
 mod meshopt;
 
 use std::collections::HashMap;

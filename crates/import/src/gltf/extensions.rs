@@ -36,7 +36,7 @@ pub const EXTENSIONS: &[Extension] = &[
     entry("EXT_lights_ies", Unsupported, "these lights are left out"),
     entry("EXT_lights_image_based", Unsupported, "the environment is chosen by the renderer"),
     entry("EXT_mesh_features", Ignored, "identifiers without effect on the picture"),
-    entry("EXT_mesh_gpu_instancing", Unsupported, "each such mesh is drawn once, at its node"),
+    entry("EXT_mesh_gpu_instancing", Full, "instances share their mesh; skins are drawn once"),
     entry("EXT_mesh_manifold", Ignored, "the triangles are the same"),
     entry("EXT_meshopt_compression", Full, ""),
     entry("EXT_structural_metadata", Ignored, "data without effect on the picture"),

@@ -7,13 +7,14 @@ use gltf::json::Index;
 use rayon::prelude::*;
 
 use super::bake;
+use super::instancing;
 use super::material;
 use super::mesh::{self, MeshReader, NormalMapping, Primitive};
 use super::node::Nodes;
 use super::source::Source;
 use crate::bake::deform;
 use crate::scene::{GeometryDesc, InstanceDesc, MeshDesc, SceneDesc, SurfaceDesc};
-use crate::{ImportError, Report};
+use crate::{ErrorKind, ImportError, Report};
 
 /// How a node shows its mesh.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -71,12 +72,30 @@ pub(super) fn place(
         }
     }
     mesh::warn_of_undrawn(source, report);
-    let drawn: Vec<usize> = nodes.shown.iter().copied().filter(|node| placed.contains_key(node)).collect();
-    scene.instances.extend(drawn.iter().map(|node| {
-        let name = source.root.nodes[*node].name.clone().unwrap_or_else(|| format!("node {node}"));
-        let (mesh, transform) = placed[node];
-        InstanceDesc { name, mesh, transform, moves_to: None }
-    }));
+    // The node of each instance.
+    let mut drawn: Vec<usize> = Vec::new();
+    let mut weight = 0_u64;
+    for &node in &nodes.shown {
+        let Some(&(mesh, transform)) = placed.get(&node) else { continue };
+        let name = source.root.nodes[node].name.clone().unwrap_or_else(|| format!("node {node}"));
+        let instance = |transform| InstanceDesc { name: name.clone(), mesh, transform, moves_to: None };
+        let Some(places) =
+            instancing::transforms(source, node)?.filter(|_| placement(source, node) != Placement::Skinned)
+        else {
+            scene.instances.push(instance(transform));
+            drawn.push(node);
+            continue;
+        };
+        // Names are copied: a long one counts as several instances.
+        weight = weight.saturating_add(places.len() as u64 * (1 + name.len() as u64 / 256));
+        if weight > source.limits.instances {
+            let cause =
+                format!("with this node there are more instances than the limit of {}", source.limits.instances);
+            return Err(source.at(format!("/nodes/{node}"), ErrorKind::Limit(cause)));
+        }
+        drawn.resize(drawn.len() + places.len(), node);
+        scene.instances.extend(places.into_iter().map(|place| instance(transform * place)));
+    }
     let warn = |i: usize, _: &str, message| report.warn(source.file, format!("/nodes/{}", drawn[i]), message);
     scene.bake(source.limits, warn).map_err(|kind| source.at("/nodes", kind))?;
     complete(scene);

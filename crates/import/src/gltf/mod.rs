@@ -26,6 +26,7 @@ mod draco;
 mod extensions;
 mod glb;
 mod instance;
+mod instancing;
 mod json;
 mod layers;
 mod material;
@@ -128,5 +129,7 @@ fn triangles_all_scenes(root: &Root) -> u64 {
         m.primitives.iter().fold(0, |sum: u64, p| sum.saturating_add(mesh::triangle_count(root, p)))
     };
     let counts: Vec<u64> = root.meshes.iter().map(of_mesh).collect();
-    root.nodes.iter().filter_map(|n| n.mesh).fold(0, |sum, m| sum.saturating_add(counts[m.value()]))
+    let of_node =
+        |n: &::gltf::json::Node| n.mesh.map_or(0, |m| counts[m.value()].saturating_mul(instancing::count(root, n)));
+    root.nodes.iter().map(of_node).fold(0, u64::saturating_add)
 }
