@@ -1,0 +1,232 @@
+"""What is compiled of the package."""
+
+from collections.abc import Sequence
+from os import PathLike
+from typing import Any, Literal, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__version__: str
+
+INVALID_ID: int
+"""The id of what there is not, 2**32 - 1: of a ray that meets nothing."""
+
+_Precision = Literal["fast", "robust", "double", "exact"]
+_Quality = Literal["fast", "balanced", "high"]
+_Crossings = Literal["triangles", "surfaces"]
+
+@final
+class Hits:
+    """What each ray meets first. Fields are made when they are asked for, and have the shape of the rays.
+
+    It also indexes like a dictionary: ``hits["t_hit"]``.
+    """
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The leading shape of the rays."""
+    @property
+    def hit(self) -> NDArray[np.bool_]:
+        """Whether there is a hit."""
+    @property
+    def t_hit(self) -> NDArray[np.float64]:
+        """Ray parameter, in lengths of the direction; infinity where there is no hit."""
+    @property
+    def instance_ids(self) -> NDArray[np.uint32]:
+        """Index of the instance, or `INVALID_ID`."""
+    @property
+    def geometry_ids(self) -> NDArray[np.uint32]:
+        """Index of the geometry in its mesh, or `INVALID_ID`."""
+    @property
+    def primitive_ids(self) -> NDArray[np.uint32]:
+        """Index of the triangle in its geometry, or `INVALID_ID`."""
+    @property
+    def primitive_uvs(self) -> NDArray[np.float32]:
+        """Weights of the triangle's second and third vertex, shape ``(..., 2)``."""
+    @property
+    def primitive_normals(self) -> NDArray[np.float64]:
+        """Unit normals in the world by the winding of the triangle, shape ``(..., 3)``; zero where there is no hit."""
+    def keys(self) -> list[str]: ...
+    def __getitem__(self, key: str, /) -> NDArray[Any]: ...
+
+@final
+class HitLists:
+    """Everything that each ray meets: one list of hits after the other, each sorted along its ray.
+
+    The hits of ray ``i`` are those from ``ray_splits[i]`` to ``ray_splits[i + 1]``.
+    """
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The leading shape of the rays."""
+    @property
+    def ray_splits(self) -> NDArray[np.int64]:
+        """Where the hits of each ray begin, and the end of the last: one more than there are rays."""
+    @property
+    def ray_ids(self) -> NDArray[np.int64]:
+        """The ray of each hit, as an index into the flattened rays."""
+    @property
+    def t_hit(self) -> NDArray[np.float64]:
+        """Ray parameter, in lengths of the direction."""
+    @property
+    def instance_ids(self) -> NDArray[np.uint32]:
+        """Index of the instance."""
+    @property
+    def geometry_ids(self) -> NDArray[np.uint32]:
+        """Index of the geometry in its mesh."""
+    @property
+    def primitive_ids(self) -> NDArray[np.uint32]:
+        """Index of the triangle in its geometry."""
+    @property
+    def primitive_uvs(self) -> NDArray[np.float32]:
+        """Weights of the triangle's second and third vertex, shape ``(n, 2)``."""
+    @property
+    def primitive_normals(self) -> NDArray[np.float64]:
+        """Unit normals in the world by the winding of the triangle, shape ``(n, 3)``."""
+    def keys(self) -> list[str]: ...
+    def __getitem__(self, key: str, /) -> NDArray[Any]: ...
+    def __len__(self) -> int: ...
+
+class Scene:
+    """Triangles and instances with their trees. Built once, then only asked, from any number of threads.
+
+    Rays are given as an array of shape ``(..., 6)`` (origin and direction) or ``(..., 8)`` (``t_min`` and ``t_max``
+    too), or as origins and directions of shape ``(..., 3)``, which are repeated to each other's shape as NumPy does.
+    Anything that NumPy takes will do; arrays of 64- or 32-bit floats in order are not copied. The direction need not be
+    unit. ``t_min`` and ``t_max`` are numbers or arrays, one for each ray. A ray with a NaN meets nothing.
+
+    ``threads``: how many threads answer, 0 for one per core. Answers are the same bits for any number, and for one
+    ray alone as among many. Other Python threads run meanwhile; arrays must not be changed by them.
+    """
+
+    def __init__(
+        self,
+        vertices: ArrayLike | Any,
+        triangles: ArrayLike | None = None,
+        *,
+        precision: _Precision = "robust",
+        quality: _Quality = "balanced",
+        threads: int = 0,
+    ) -> None:
+        """Builds a scene of vertices ``(n, 3)`` and triangles ``(m, 3)``, or of an object that has them: a mesh of
+        trimesh or Open3D.
+
+        Vertices are stored in 32 bits, as seen from the middle of the mesh where that loses less.
+
+        Raises ValueError: for shapes that do not fit, vertices that are not finite, indices of no vertex.
+        """
+    def closest_hit(
+        self,
+        rays: ArrayLike,
+        directions: ArrayLike | None = None,
+        *,
+        t_min: ArrayLike | None = None,
+        t_max: ArrayLike | None = None,
+        threads: int = 0,
+    ) -> Hits:
+        """What each ray meets first. Of several triangles at the same ``t``, that of the smallest id."""
+    def closest_hits(
+        self,
+        rays: ArrayLike,
+        directions: ArrayLike | None = None,
+        *,
+        t_min: ArrayLike | None = None,
+        t_max: ArrayLike | None = None,
+        threads: int = 0,
+    ) -> Hits:
+        """`closest_hit`."""
+    def any_hit(
+        self,
+        rays: ArrayLike,
+        directions: ArrayLike | None = None,
+        *,
+        t_min: ArrayLike | None = None,
+        t_max: ArrayLike | None = None,
+        threads: int = 0,
+    ) -> NDArray[np.bool_]:
+        """Whether each ray meets anything."""
+    def count_hits(
+        self,
+        rays: ArrayLike,
+        directions: ArrayLike | None = None,
+        *,
+        t_min: ArrayLike | None = None,
+        t_max: ArrayLike | None = None,
+        crossings: _Crossings = "triangles",
+        threads: int = 0,
+    ) -> NDArray[np.uint32]:
+        """How often each ray meets something.
+
+        With ``crossings="surfaces"`` a ray through an edge or a vertex crosses the surface there once, and the count
+        of a closed mesh is odd from inside and even from outside.
+        """
+    def all_hits(
+        self,
+        rays: ArrayLike,
+        directions: ArrayLike | None = None,
+        *,
+        t_min: ArrayLike | None = None,
+        t_max: ArrayLike | None = None,
+        crossings: _Crossings = "triangles",
+        threads: int = 0,
+    ) -> HitLists:
+        """Everything that each ray meets; for ``crossings`` see `count_hits`."""
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """Lower and upper corner of a box around everything, shape ``(2, 3)``."""
+    @property
+    def precision(self) -> str:
+        """The tier of precision it was built for."""
+    @property
+    def stats(self) -> dict[str, float]:
+        """Triangles, instances, bytes, depth and surface-area cost of the trees."""
+    @property
+    def warnings(self) -> list[str]:
+        """What of a file could be read only in part."""
+
+def load(
+    path: str | PathLike[str],
+    *,
+    precision: _Precision = "robust",
+    quality: _Quality = "balanced",
+    up: str | None = None,
+    variant: str | None = None,
+    threads: int = 0,
+) -> Scene:
+    """Reads a model or scene file: .obj (.obj.zst, .obj.gz), .gltf, .glb, .toml, .json.
+
+    ``up``: the file's upward axis (``"+Z"``), which becomes +Y; by default what the format says. Such a scene is
+    pickled as the path of its file.
+
+    Raises OSError if the file cannot be read, ValueError if it is broken.
+    """
+
+def render(
+    scene: Scene | str | PathLike[str],
+    *,
+    width: int = 1280,
+    height: int = 720,
+    samples: int = 16,
+    noise_threshold: float | None = None,
+    time_limit: float | None = None,
+    seed: int = 0,
+    integrator: str = "auto",
+    camera: str | None = None,
+    position: Sequence[float] | None = None,
+    focal_point: Sequence[float] | None = None,
+    view_up: Sequence[float] | None = None,
+    view_angle: float | None = None,
+    orthographic: bool = False,
+    transparent: bool = False,
+    exposure: float = 0.0,
+    tone_mapping: Literal["pbr-neutral", "agx", "srgb", "none"] = "pbr-neutral",
+    linear: bool = False,
+    threads: int = 0,
+) -> NDArray[Any]:
+    """Renders a picture: ``(height, width, 4)`` of uint8, sRGB and alpha; with ``linear`` the radiance as float32,
+    multiplied by alpha.
+
+    ``samples`` per pixel (the most of them, with a ``noise_threshold`` or a ``time_limit`` in seconds); the angle is in
+    degrees. The camera frames the scene unless it is told otherwise. Ctrl-C ends it.
+    """

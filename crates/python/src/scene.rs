@@ -1,0 +1,410 @@
+//! Scenes and what they are asked.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use firsthit_accel::{BuildOptions, BuildQuality, Crossings, SceneBuilder};
+use firsthit_geometry::{Precision, Ray};
+use firsthit_import::{Imported, Options, UpAxis};
+use glam::{DVec3, Vec3};
+use numpy::{Element, PyArray1, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
+use rayon::prelude::*;
+
+use crate::arrays::triangles;
+use crate::error;
+use crate::hits::{Found, HitLists, Hits, Slots};
+use crate::mesh::Mesh;
+use crate::pool::pool;
+use crate::rays::{Rays, View};
+
+/// Rays that one task takes.
+const CHUNK: usize = 1024;
+
+/// So few rays are answered at once, without letting Python go.
+const FEW: usize = 16;
+
+/// Where a scene comes from: what it is pickled and rendered by.
+#[derive(Clone, Debug)]
+pub(crate) enum Source {
+    Arrays(Arc<Mesh>),
+    File { path: PathBuf, up: Option<String>, variant: Option<String> },
+}
+
+/// A scene; see `_firsthit.pyi`.
+#[pyclass(frozen, module = "firsthit", subclass)]
+pub struct Scene {
+    scene: firsthit_accel::Scene,
+    pub(crate) source: Source,
+    warnings: Vec<String>,
+}
+
+/// How trees are built, by name.
+pub(crate) fn build_options(precision: &str, quality: &str) -> PyResult<BuildOptions> {
+    let precision: Precision = precision.parse().map_err(error::value)?;
+    let quality = match quality {
+        "fast" => BuildQuality::Fast,
+        "balanced" => BuildQuality::Balanced,
+        "high" => BuildQuality::High,
+        other => return Err(error::value(format_args!("unknown quality '{other}' (fast, balanced or high)"))),
+    };
+    Ok(BuildOptions { precision, quality, ..BuildOptions::default() })
+}
+
+fn crossings(name: &str) -> PyResult<Crossings> {
+    match name {
+        "triangles" => Ok(Crossings::Triangles),
+        "surfaces" => Ok(Crossings::Surfaces),
+        other => Err(error::value(format_args!("unknown crossings '{other}' (triangles or surfaces)"))),
+    }
+}
+
+fn quality_name(quality: BuildQuality) -> &'static str {
+    match quality {
+        BuildQuality::Fast => "fast",
+        BuildQuality::Balanced => "balanced",
+        BuildQuality::High => "high",
+    }
+}
+
+impl Source {
+    /// Reads the file, with what could be read only in part; an array has all in it.
+    pub(crate) fn read(&self) -> PyResult<(firsthit_import::SceneDesc, Vec<String>)> {
+        match self {
+            Self::Arrays(mesh) => Ok((mesh.desc(), Vec::new())),
+            Self::File { path, up, variant } => {
+                let up = up.as_deref().map(str::parse::<UpAxis>).transpose().map_err(error::value)?;
+                let options = Options { up, variant: variant.clone(), without_occlusion: true, ..Options::default() };
+                let Imported { scene, report } =
+                    firsthit_import::open(path, &options).map_err(|e| error::import(&e))?;
+                Ok((scene, report.warnings.iter().map(ToString::to_string).collect()))
+            }
+        }
+    }
+}
+
+impl Scene {
+    pub(crate) fn options(&self) -> BuildOptions {
+        self.scene.options()
+    }
+
+    fn of_mesh(py: Python<'_>, mesh: Mesh, options: BuildOptions, threads: usize) -> PyResult<Self> {
+        let pool = pool(threads)?;
+        let scene = py.detach(|| pool.install(|| mesh.build(options))).map_err(error::value)?;
+        Ok(Self { scene, source: Source::Arrays(Arc::new(mesh)), warnings: Vec::new() })
+    }
+
+    fn open(py: Python<'_>, source: Source, options: BuildOptions, threads: usize) -> PyResult<Self> {
+        let pool = pool(threads)?;
+        let (scene, warnings) = py.detach(|| {
+            pool.install(|| {
+                let (desc, warnings) = source.read()?;
+                let scene = SceneBuilder::from_desc(&desc, options).build().map_err(error::value)?;
+                PyResult::Ok((scene, warnings))
+            })
+        })?;
+        Ok(Self { scene, source, warnings })
+    }
+
+    /// One value for each ray, from a function of many rays.
+    fn each<'py, T: Element + Copy + Default + Send>(
+        &self,
+        py: Python<'py>,
+        rays: &Rays<'_>,
+        threads: usize,
+        answer: impl Fn(&[Ray<f64>], &mut [T]) + Sync,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let mut answers = vec![T::default(); rays.count];
+        let parts: Vec<&mut [T]> = answers.chunks_mut(CHUNK).collect();
+        in_chunks(py, rays, threads, parts, |rays, part| answer(rays, part))?;
+        Ok(PyArray1::from_vec(py, answers).reshape(rays.shape.clone())?.into_any())
+    }
+}
+
+/// Gives each chunk of the rays its part of the answers, on threads unless there are few.
+fn in_chunks<P: Send>(
+    py: Python<'_>,
+    rays: &Rays<'_>,
+    threads: usize,
+    parts: Vec<P>,
+    answer: impl Fn(&[Ray<f64>], P) + Sync,
+) -> PyResult<()> {
+    let view = rays.view();
+    let count = rays.count;
+    let fill = |buffer: &mut Vec<Ray<f64>>, chunk: usize, view: &View<'_>| {
+        buffer.clear();
+        buffer.extend((chunk * CHUNK..count.min((chunk + 1) * CHUNK)).map(|i| view.ray(i)));
+    };
+    if count <= FEW {
+        let mut buffer = Vec::new();
+        for (chunk, part) in parts.into_iter().enumerate() {
+            fill(&mut buffer, chunk, &view);
+            answer(&buffer, part);
+        }
+        return Ok(());
+    }
+    if threads == 1 || count <= CHUNK {
+        py.detach(|| {
+            let mut buffer = Vec::with_capacity(CHUNK.min(count));
+            for (chunk, part) in parts.into_iter().enumerate() {
+                fill(&mut buffer, chunk, &view);
+                answer(&buffer, part);
+            }
+        });
+        return Ok(());
+    }
+    let pool = pool(threads)?;
+    py.detach(|| {
+        pool.install(|| {
+            parts.into_par_iter().enumerate().for_each_init(Vec::new, |buffer, (chunk, part)| {
+                fill(buffer, chunk, &view);
+                answer(buffer, part);
+            });
+        });
+    });
+    Ok(())
+}
+
+#[pymethods]
+impl Scene {
+    #[new]
+    #[pyo3(signature = (vertices, triangles=None, *, precision="robust", quality="balanced", threads=0))]
+    fn new(
+        py: Python<'_>,
+        vertices: &Bound<'_, PyAny>,
+        triangles: Option<&Bound<'_, PyAny>>,
+        precision: &str,
+        quality: &str,
+        threads: usize,
+    ) -> PyResult<Self> {
+        let options = build_options(precision, quality)?;
+        let mesh = match triangles {
+            Some(triangles) => Mesh::new(vertices, self::triangles(triangles)?)?,
+            // A mesh of trimesh, or of Open3D.
+            None if vertices.hasattr("vertices")? => {
+                let name = if vertices.hasattr("faces")? { "faces" } else { "triangles" };
+                Mesh::new(&vertices.getattr("vertices")?, self::triangles(&vertices.getattr(name)?)?)?
+            }
+            None => return Err(error::value("vertices and triangles are needed, or an object that has them")),
+        };
+        Self::of_mesh(py, mesh, options, threads)
+    }
+
+    #[pyo3(signature = (rays, directions=None, *, t_min=None, t_max=None, threads=0))]
+    fn closest_hit(
+        &self,
+        py: Python<'_>,
+        rays: &Bound<'_, PyAny>,
+        directions: Option<&Bound<'_, PyAny>>,
+        t_min: Option<&Bound<'_, PyAny>>,
+        t_max: Option<&Bound<'_, PyAny>>,
+        threads: usize,
+    ) -> PyResult<Hits> {
+        let rays = Rays::new(rays, directions, t_min, t_max)?;
+        let mut found = Found::zeroed(rays.count);
+        let parts = found.slots().chunks(CHUNK);
+        in_chunks(py, &rays, threads, parts, |rays, mut part: Slots<'_>| {
+            if let [ray] = rays {
+                return part.set(0, self.scene.closest_hit(ray).as_ref());
+            }
+            // On the stack: it is filled anew for each few, and stays near.
+            let mut hits = [None; 64];
+            for (k, rays) in rays.chunks(hits.len()).enumerate() {
+                let hits = &mut hits[..rays.len()];
+                self.scene.closest_hits(rays, hits);
+                for (i, hit) in hits.iter().enumerate() {
+                    part.set(64 * k + i, hit.as_ref());
+                }
+            }
+        })?;
+        Ok(Hits::new(rays.shape, found))
+    }
+
+    /// The name of the slice form in Rust: here one does it all.
+    #[pyo3(signature = (rays, directions=None, *, t_min=None, t_max=None, threads=0))]
+    fn closest_hits(
+        &self,
+        py: Python<'_>,
+        rays: &Bound<'_, PyAny>,
+        directions: Option<&Bound<'_, PyAny>>,
+        t_min: Option<&Bound<'_, PyAny>>,
+        t_max: Option<&Bound<'_, PyAny>>,
+        threads: usize,
+    ) -> PyResult<Hits> {
+        self.closest_hit(py, rays, directions, t_min, t_max, threads)
+    }
+
+    #[pyo3(signature = (rays, directions=None, *, t_min=None, t_max=None, threads=0))]
+    fn any_hit<'py>(
+        &self,
+        py: Python<'py>,
+        rays: &Bound<'py, PyAny>,
+        directions: Option<&Bound<'py, PyAny>>,
+        t_min: Option<&Bound<'py, PyAny>>,
+        t_max: Option<&Bound<'py, PyAny>>,
+        threads: usize,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let rays = Rays::new(rays, directions, t_min, t_max)?;
+        self.each(py, &rays, threads, |rays, hits| self.scene.any_hits(rays, hits))
+    }
+
+    #[pyo3(signature = (rays, directions=None, *, t_min=None, t_max=None, crossings="triangles", threads=0))]
+    fn count_hits<'py>(
+        &self,
+        py: Python<'py>,
+        rays: &Bound<'py, PyAny>,
+        directions: Option<&Bound<'py, PyAny>>,
+        t_min: Option<&Bound<'py, PyAny>>,
+        t_max: Option<&Bound<'py, PyAny>>,
+        crossings: &str,
+        threads: usize,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let crossings = self::crossings(crossings)?;
+        let rays = Rays::new(rays, directions, t_min, t_max)?;
+        self.each(py, &rays, threads, |rays, counts| self.scene.count_hits_each(rays, crossings, counts))
+    }
+
+    #[pyo3(signature = (rays, directions=None, *, t_min=None, t_max=None, crossings="triangles", threads=0))]
+    fn all_hits(
+        &self,
+        py: Python<'_>,
+        rays: &Bound<'_, PyAny>,
+        directions: Option<&Bound<'_, PyAny>>,
+        t_min: Option<&Bound<'_, PyAny>>,
+        t_max: Option<&Bound<'_, PyAny>>,
+        crossings: &str,
+        threads: usize,
+    ) -> PyResult<HitLists> {
+        let crossings = self::crossings(crossings)?;
+        let rays = Rays::new(rays, directions, t_min, t_max)?;
+        let mut lists = vec![firsthit_accel::HitLists::default(); rays.count.div_ceil(CHUNK)];
+        let parts: Vec<_> = lists.iter_mut().collect();
+        in_chunks(py, &rays, threads, parts, |rays, list| *list = self.scene.all_hits_each(rays, crossings))?;
+        let (splits, found) = py.detach(|| {
+            let total = lists.iter().map(|l| l.hits().len()).sum();
+            let mut splits = Vec::with_capacity(rays.count + 1);
+            splits.push(0);
+            let mut found = Found::zeroed(total);
+            let mut slots = found.slots();
+            let mut end = 0;
+            for hits in lists.iter().flat_map(firsthit_accel::HitLists::iter) {
+                for hit in hits {
+                    slots.set(end, Some(hit));
+                    end += 1;
+                }
+                splits.push(end as i64);
+            }
+            (splits, found)
+        });
+        Ok(HitLists::new(rays.shape, splits, found))
+    }
+
+    #[getter]
+    fn bounds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let bounds = self.scene.bounds();
+        let corners = [bounds.min.to_array(), bounds.max.to_array()].concat();
+        Ok(PyArray1::from_vec(py, corners).reshape([2, 3])?.into_any())
+    }
+
+    #[getter]
+    fn precision(&self) -> &'static str {
+        self.options().precision.name()
+    }
+
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.warnings.clone()
+    }
+
+    #[getter]
+    fn stats<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let stats = self.scene.stats();
+        let out = PyDict::new(py);
+        out.set_item("stored_triangles", stats.stored_triangles)?;
+        out.set_item("instanced_triangles", stats.instanced_triangles)?;
+        out.set_item("instances", stats.instances)?;
+        out.set_item("degenerate_triangles", stats.degenerate_triangles)?;
+        out.set_item("bytes", stats.bytes)?;
+        out.set_item("depth", stats.depth)?;
+        out.set_item("sah_cost", stats.sah_cost)?;
+        Ok(out)
+    }
+
+    fn __repr__(&self) -> String {
+        let stats = self.scene.stats();
+        let (triangles, instances) = (stats.instanced_triangles, stats.instances);
+        format!("<firsthit.Scene of {triangles} triangles in {instances} instances, {}>", self.precision())
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let module = py.import("firsthit._firsthit")?;
+        let (precision, quality) = (self.precision(), quality_name(self.options().quality));
+        match &self.source {
+            Source::Arrays(mesh) => {
+                let positions: Vec<f32> = mesh.positions.iter().flat_map(|p| p.to_array()).collect();
+                let positions = PyArray1::from_vec(py, positions);
+                let triangles = PyArray1::from_vec(py, mesh.triangles.as_flattened().to_vec());
+                let arguments = (positions, triangles, mesh.origin.to_array(), precision, quality);
+                (module.getattr("_restore")?, arguments).into_pyobject(py)
+            }
+            Source::File { path, up, variant } => {
+                let arguments = (path, precision, quality, up, variant);
+                (module.getattr("_reload")?, arguments).into_pyobject(py)
+            }
+        }
+    }
+}
+
+/// Reads a model; see `_firsthit.pyi`.
+#[pyfunction]
+#[pyo3(signature = (path, *, precision="robust", quality="balanced", up=None, variant=None, threads=0))]
+pub fn load(
+    py: Python<'_>,
+    path: PathBuf,
+    precision: &str,
+    quality: &str,
+    up: Option<String>,
+    variant: Option<String>,
+    threads: usize,
+) -> PyResult<Scene> {
+    let options = build_options(precision, quality)?;
+    // A pickled scene is found again from another folder.
+    let path = std::path::absolute(&path).unwrap_or(path);
+    Scene::open(py, Source::File { path, up, variant }, options, threads)
+}
+
+/// A scene of a file that was pickled.
+#[pyfunction(name = "_reload")]
+pub fn reload(
+    py: Python<'_>,
+    path: PathBuf,
+    precision: &str,
+    quality: &str,
+    up: Option<String>,
+    variant: Option<String>,
+) -> PyResult<Scene> {
+    load(py, path, precision, quality, up, variant, 0)
+}
+
+/// A scene of arrays that was pickled.
+#[pyfunction(name = "_restore")]
+pub fn restore(
+    py: Python<'_>,
+    positions: &Bound<'_, PyArray1<f32>>,
+    triangles: &Bound<'_, PyArray1<u32>>,
+    origin: [f64; 3],
+    precision: &str,
+    quality: &str,
+) -> PyResult<Scene> {
+    let positions = positions.try_readonly().map_err(error::value)?;
+    let triangles = triangles.try_readonly().map_err(error::value)?;
+    let positions = positions.as_slice().map_err(error::value)?.as_chunks::<3>().0;
+    let triangles = triangles.as_slice().map_err(error::value)?.as_chunks::<3>().0;
+    let mesh = Mesh {
+        positions: positions.iter().copied().map(Vec3::from).collect(),
+        triangles: triangles.to_vec(),
+        origin: DVec3::from(origin),
+    };
+    Scene::of_mesh(py, mesh, build_options(precision, quality)?, 0)
+}
