@@ -13,6 +13,7 @@ use crate::build::{Child, Topology};
 use crate::layout::wide8::{Node, Reference};
 use crate::layout::{Bvh2, Tree};
 use crate::local::{Extent, LocalRay};
+use crate::nearest::{Boxed, Point, squared_distance, walk, walk_binary};
 use crate::simd::{self, Available, Lanes, Stack, Work};
 use crate::stats::Probe;
 use crate::traverse::traverse;
@@ -130,6 +131,79 @@ impl Above {
                 flow
             }
         }
+    }
+}
+
+impl Above {
+    /// Visits the boxes that are not farther from a point than the limit (squared), the nearest first. `visit` gets their
+    /// numbers, and answers with the limit from there on.
+    pub(crate) fn nearest(&self, point: DVec3, limit: f64, visit: &mut dyn FnMut(&[u32]) -> f64) {
+        match &self.tree {
+            AboveTree::Binary(tree) => {
+                // The boxes have room for what is rounded in meshes; here for what is rounded in distances.
+                let distance = |b: &Aabb<f64>| squared_distance(b, point) * (1.0 - 1e-12);
+                walk_binary(tree, distance, limit, |range| visit(&self.order[range]));
+            }
+            AboveTree::Wide(wide) => {
+                let local = (point - wide.frame.center) / wide.frame.scale;
+                if wide.nodes.is_empty() || !(local.abs().max_element() < 2f64.powi(30)) {
+                    visit(&self.order);
+                    return;
+                }
+                let rounded = (local - local.as_vec3().as_dvec3()).length() + 2f64.powi(-21);
+                simd::run(wide.level, Nearest { wide, order: &self.order, local, rounded, limit, visit });
+            }
+        }
+    }
+}
+
+/// [`Above::nearest`] by the instructions of a level.
+struct Nearest<'a> {
+    wide: &'a Wide,
+    order: &'a [u32],
+    local: DVec3,
+    /// How far the point may be from where it is seen.
+    rounded: f64,
+    limit: f64,
+    visit: &'a mut dyn FnMut(&[u32]) -> f64,
+}
+
+impl Nearest<'_> {
+    fn limit(&self, squared: f64) -> f32 {
+        let far = squared.sqrt() / self.wide.frame.scale + self.rounded;
+        (far * far * (1.0 + 1e-5)).min(f64::from(f32::MAX)).to_f32().next_up().min(f32::MAX)
+    }
+}
+
+impl Work for Nearest<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(mut self) {
+        let limit = self.limit(self.limit);
+        let point = self.local.as_vec3();
+        walk::<L>(&mut self, point, limit);
+    }
+}
+
+impl<L: Lanes> Boxed<L> for Nearest<'_> {
+    type Node = Node;
+
+    #[inline(always)]
+    fn root(&self) -> Reference {
+        Reference(0)
+    }
+
+    #[inline(always)]
+    fn node(&self, at: Reference) -> &Node {
+        &self.wide.nodes[at.index()]
+    }
+
+    #[inline(always)]
+    fn leaf(&mut self, at: Reference, _: Point<L>, _: f32) -> f32 {
+        let run = self.wide.runs[(at.0 & !Reference::LEAF) as usize].clone();
+        let squared = (self.visit)(&self.order[run.start as usize..run.end as usize]);
+        self.limit(squared)
     }
 }
 

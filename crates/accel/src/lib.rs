@@ -37,6 +37,7 @@ mod kernel;
 mod layout;
 mod local;
 mod model;
+mod nearest;
 mod normalise;
 mod offer;
 mod order;
@@ -50,6 +51,7 @@ mod scene;
 #[allow(unsafe_code, reason = "the room for instructions of the processor")]
 mod simd;
 mod single;
+mod solid;
 mod stats;
 mod surface_point;
 mod traverse;
@@ -61,8 +63,9 @@ pub use builder::{Geometry, SceneBuilder};
 pub use error::BuildError;
 pub use guards::Guards;
 pub use hit::{Hit, HitId, SurfacePoint, TraversalCounts};
-pub use query::{Crossings, HitLists};
+pub use query::{ClosestPoint, Crossings, HitLists};
 pub use scene::{Scene, SceneStats};
 pub use simd::Level;
+pub use solid::{SignMethod, Solid};
 #[doc(hidden)]
 pub use visit_order::VisitOrder;

@@ -406,6 +406,11 @@ impl Model {
         }
     }
 
+    /// The corners of a triangle, normalised.
+    pub(crate) fn corners(&self, id: PrimitiveId) -> Option<[DVec3; 3]> {
+        if let Surface::Triangle(corners) = self.surface(id)? { Some(corners) } else { None }
+    }
+
     /// The place of a triangle in the tree.
     #[inline]
     pub(crate) fn place(&self, id: PrimitiveId) -> Option<usize> {
@@ -467,6 +472,35 @@ impl Model {
     #[inline(always)]
     pub(crate) fn compact(&self) -> Option<(&Compact8, Available)> {
         if let MeshTree::Compact { tree, level } = &self.tree { Some((tree, *level)) } else { None }
+    }
+
+    /// The binary tree, if that is what there is.
+    pub(crate) fn binary(&self) -> Option<&Bvh2<f32>> {
+        if let MeshTree::Binary { tree, .. } = &self.tree { Some(tree) } else { None }
+    }
+
+    /// The triangle at a place of a binary tree, with its number; `None` where there is none, but a shape perhaps.
+    pub(crate) fn numbered(&self, place: usize) -> Option<(u32, [Vec3; 3])> {
+        let id = self.id(place)?;
+        matches!(self.places.get(id.geometry as usize)?, Places::Triangles(_)).then_some(())?;
+        Some((self.number(place)?, self.triangle(place)?))
+    }
+
+    /// All triangles in the tree with their numbers, in the caller's order.
+    pub(crate) fn each_triangle(&self, mut f: impl FnMut(u32, [Vec3; 3])) {
+        for (places, &first) in self.places.iter().zip(&self.firsts) {
+            let Places::Triangles(places) = places else { continue };
+            for (number, &place) in (first..).zip(places) {
+                if let Some(triangle) = self.triangle(place as usize) {
+                    f(number, triangle);
+                }
+            }
+        }
+    }
+
+    /// The primitive with a number.
+    pub(crate) fn of_number(&self, number: u32) -> Option<PrimitiveId> {
+        model_id(&self.firsts, Some(number))
     }
 
     /// [`Model::trace`] by the instructions of a level.

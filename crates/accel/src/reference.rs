@@ -5,6 +5,7 @@
 
 use core::ops::ControlFlow;
 
+use firsthit_geometry::distance::closest_on_triangle;
 use firsthit_geometry::{
     Primitive, Ray,
     exact::{ExactRay, Root},
@@ -13,7 +14,7 @@ use firsthit_geometry::{
 use glam::DVec3;
 
 use crate::model::Surface;
-use crate::{Crossings, Hit, HitId, Scene};
+use crate::{ClosestPoint, Crossings, Hit, HitId, Scene};
 
 /// All hits in the ray's closed interval, by `t`, then by id, those of the closed triangles
 /// ([`Crossings::Triangles`]). Of a shape that a ray meets more than once, all.
@@ -129,4 +130,58 @@ pub fn closest_hit(scene: &Scene, ray: &Ray<f64>) -> Option<Hit> {
 #[must_use]
 pub fn any_hit(scene: &Scene, ray: &Ray<f64>) -> bool {
     !all_hits(scene, ray).is_empty()
+}
+
+/// The nearest point of all triangles, each measured in the world in `f64`; of several that are equally near, that of the
+/// smallest id.
+#[must_use]
+pub fn closest_point(scene: &Scene, point: DVec3) -> Option<ClosestPoint> {
+    nearest_k(scene, point, 1, f64::INFINITY).into_iter().next()
+}
+
+/// So many triangles with their nearest points, not farther than `radius`: by distance, then by id.
+#[must_use]
+pub fn nearest_k(scene: &Scene, point: DVec3, count: usize, radius: f64) -> Vec<ClosestPoint> {
+    if !point.is_finite() {
+        return Vec::new();
+    }
+    let mut all = Vec::new();
+    for (id, corners) in placed(scene, point) {
+        let at = closest_on_triangle::<f64>(corners, DVec3::ZERO);
+        let squared = at.point.length_squared();
+        if squared <= radius * radius {
+            let [a, b, c] = corners;
+            let (distance, [_, u, v]) = (at.point.length(), at.weights.map(|w| w as f32));
+            let (point, feature, normal_direction) = (point + at.point, at.feature(), (b - a).cross(c - a));
+            all.push((squared, ClosestPoint { id, point, distance, u, v, feature, normal_direction }));
+        }
+    }
+    all.sort_by(|(d, a), (e, b)| d.total_cmp(e).then(a.id.cmp(&b.id)));
+    all.into_iter().map(|(_, nearest)| nearest).take(count).collect()
+}
+
+/// How often the triangles wind around a point: the sum of their solid angles as seen from there, over 4 pi.
+#[must_use]
+pub fn winding_number(scene: &Scene, point: DVec3) -> f64 {
+    let angles = placed(scene, point).map(|(id, [a, b, c])| {
+        let (la, lb, lc) = (a.length(), b.length(), c.length());
+        let around = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+        let angle = 2.0 * a.cross(b).dot(c).atan2(around);
+        // A mirrored mesh keeps its outside.
+        let mirrored = scene.instances()[id.instance as usize].transform.linear().determinant() < 0.0;
+        if mirrored { -angle } else { angle }
+    });
+    angles.sum::<f64>() / (4.0 * core::f64::consts::PI)
+}
+
+/// All triangles in the world, as seen from a point.
+fn placed(scene: &Scene, point: DVec3) -> impl Iterator<Item = (HitId, [DVec3; 3])> {
+    scene.instances().iter().zip(0..).flat_map(move |(instance, i)| {
+        let (linear, offset) = (instance.transform.linear(), instance.transform.translation() - point);
+        scene.models()[instance.model as usize].surfaces().filter_map(move |(id, surface)| {
+            let Surface::Triangle(corners) = surface else { return None };
+            let id = HitId { instance: i, geometry: id.geometry, primitive: id.primitive };
+            Some((id, corners.map(|p| linear * p + offset)))
+        })
+    })
 }

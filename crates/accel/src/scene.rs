@@ -244,6 +244,15 @@ impl Scene {
 }
 
 impl Inner {
+    pub(crate) fn above(&self) -> &Above {
+        &self.above
+    }
+
+    /// The instance that has a box's number in the tree above.
+    pub(crate) fn bounded(&self, k: u32) -> u32 {
+        self.bounded[k as usize]
+    }
+
     /// Offers hits to the collector, by the tests of the scene's tier.
     fn trace<const SURFACES: bool, C: Collector, P: Probe>(
         &self,

@@ -12,6 +12,40 @@ pub struct ClosestPoint<R: Real> {
     pub weights: [R; 3],
 }
 
+/// What of a triangle a point lies on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Feature {
+    /// Its inside.
+    Face,
+    /// The edge from this vertex to the next, without its ends.
+    Edge(u8),
+    /// This vertex.
+    Vertex(u8),
+}
+
+impl<R: Real> ClosestPoint<R> {
+    /// What of the triangle the point lies on: told by the weights that are 0.
+    ///
+    /// ```
+    /// use firsthit_geometry::distance::{Feature, closest_on_triangle};
+    /// use glam::DVec3;
+    /// let nearest = closest_on_triangle::<f64>([DVec3::ZERO, DVec3::X, DVec3::Y], DVec3::new(1.0, 1.0, 2.0));
+    /// assert_eq!(nearest.feature(), Feature::Edge(1));
+    /// ```
+    #[must_use]
+    pub fn feature(&self) -> Feature {
+        match self.weights.map(|w| w == R::ZERO) {
+            [_, true, true] => Feature::Vertex(0),
+            [true, _, true] => Feature::Vertex(1),
+            [true, true, _] => Feature::Vertex(2),
+            [_, _, true] => Feature::Edge(0),
+            [true, _, _] => Feature::Edge(1),
+            [_, true, _] => Feature::Edge(2),
+            _ => Feature::Face,
+        }
+    }
+}
+
 /// The point of the segment from `a` to `b` nearest to `p`. The ends may coincide.
 ///
 /// Error: some `u` times the largest distance between the three points.
@@ -39,7 +73,8 @@ pub fn closest_on_box<R: Real>(bounds: &Aabb<R>, p: R::Vec3) -> R::Vec3 {
 ///
 /// The perpendicular foot where it falls inside, else the best of the three edges (the regions of Ericson, *Real-Time
 /// Collision Detection*, section 5.1.5, without its divisions by areas that may vanish). Error: some `u` times the
-/// largest distance between the four points, divided by the sine of the smallest angle for the foot.
+/// largest distance between the four points, divided by the sine of the smallest angle for the foot. On an edge the
+/// point has the same bits for both triangles of that edge, whichever way they run through it.
 ///
 /// ```
 /// use firsthit_geometry::distance::closest_on_triangle;
@@ -60,11 +95,12 @@ pub fn closest_on_triangle<R: Real>([a, b, c]: [R::Vec3; 3], p: R::Vec3) -> Clos
         return ClosestPoint { point: a + ab * v + ac * w, weights: [R::ONE - v - w, v, w] };
     }
     let edge = |from: R::Vec3, to: R::Vec3, order: [usize; 3]| {
+        let turned = precedes::<R>(to, from);
+        let (from, to) = if turned { (to, from) } else { (from, to) };
+        let [i, j, _] = if turned { [order[1], order[0], order[2]] } else { order };
         let on_edge = closest_on_segment::<R>(from, to, p);
         let mut weights = [R::ZERO; 3];
-        for (i, weight) in order.into_iter().zip(on_edge.weights) {
-            weights[i] = weight;
-        }
+        (weights[i], weights[j]) = (on_edge.weights[0], on_edge.weights[1]);
         (squared_distance::<R>(on_edge.point, p), ClosestPoint { weights, ..on_edge })
     };
     let first = edge(a, b, [0, 1, 2]);
@@ -81,6 +117,12 @@ pub fn distance_to_triangle<R: Real>(vertices: [R::Vec3; 3], p: R::Vec3) -> R {
     // Scaled against overflow of the squares.
     let k = d.abs().max_element().power_of_two_below();
     (d * (R::ONE / k)).length() * k
+}
+
+/// Whether `a` comes before `b`, by x, then y, then z.
+fn precedes<R: Real>(a: R::Vec3, b: R::Vec3) -> bool {
+    let first = (0..3).find(|&k| a.axis(k) != b.axis(k));
+    first.is_some_and(|k| a.axis(k) < b.axis(k))
 }
 
 fn squared_distance<R: Real>(a: R::Vec3, b: R::Vec3) -> R {
@@ -124,6 +166,23 @@ mod tests {
     }
 
     #[test]
+    fn features() {
+        let t = [DVec3::ZERO, DVec3::X * 4.0, DVec3::Y * 4.0];
+        let cases = [
+            (DVec3::new(1.0, 1.0, -2.0), Feature::Face),
+            (DVec3::new(2.0, -1.0, 1.0), Feature::Edge(0)),
+            (DVec3::new(4.0, 4.0, 5.0), Feature::Edge(1)),
+            (DVec3::new(-3.0, 1.0, 1.0), Feature::Edge(2)),
+            (DVec3::new(-1.0, -1.0, 1.0), Feature::Vertex(0)),
+            (DVec3::new(6.0, -1.0, 1.0), Feature::Vertex(1)),
+            (DVec3::new(-1.0, 7.0, 1.0), Feature::Vertex(2)),
+        ];
+        for (p, feature) in cases {
+            assert_eq!(closest_on_triangle::<f64>(t, p).feature(), feature, "{p}");
+        }
+    }
+
+    #[test]
     fn box_clamps() {
         let b = Aabb::<f32>::new(Vec3::ZERO, Vec3::ONE);
         assert_eq!(closest_on_box(&b, Vec3::new(2.0, 0.5, -1.0)), Vec3::new(1.0, 0.5, 0.0));
@@ -154,6 +213,18 @@ mod tests {
             let exact = distance_to_triangle::<f64>(v32.map(|x| x.as_dvec3()), p.as_vec3().as_dvec3());
             let got = f64::from(distance_to_triangle::<f32>(v32, p.as_vec3()));
             prop_assert!((got - exact).abs() < 1e-4, "{got} {exact}");
+        }
+
+        /// Triangles that share an edge agree about its nearest point, to the bit.
+        #[test]
+        fn edges_have_one_nearest_point(v in [point(), point(), point()], p in point()) {
+            let [a, b, c] = v;
+            for other in [[b, a, c], [c, b, a], [a, c, b], [b, c, a], [c, a, b]] {
+                let (x, y) = (closest_on_triangle::<f64>(v, p), closest_on_triangle::<f64>(other, p));
+                if x.feature() != Feature::Face && y.feature() != Feature::Face {
+                    prop_assert_eq!(x.point, y.point);
+                }
+            }
         }
 
         #[test]

@@ -45,6 +45,8 @@ pub struct Transform {
     translation: DVec3,
     inverse: DMat3,
     normal: DMat3,
+    /// See [`Transform::longest_preimage`].
+    longest_preimage: f64,
     /// The linear part is a multiple of the identity, as that of most meshes: worth a test for every ray.
     uniform: bool,
 }
@@ -68,7 +70,8 @@ impl Transform {
             return Err(TransformError::Singular);
         }
         let inverse = cofactor.transpose() * (1.0 / det);
-        let condition = norm(unit) * norm(inverse);
+        let stretch = norm(inverse);
+        let condition = norm(unit) * stretch;
         if !inverse.is_finite() || !(condition <= MAX_CONDITION * (1.0 + 1e-9)) {
             return Err(TransformError::IllConditioned { condition });
         }
@@ -76,7 +79,8 @@ impl Transform {
         let normal = cofactor * det.signum();
         let uniform = m.matrix3 == DMat3::IDENTITY * m.matrix3.x_axis.x;
         let (linear, inverse) = (m.matrix3, inverse * (1.0 / k));
-        Ok(Self { linear, translation: m.translation, inverse, normal, uniform })
+        let longest_preimage = stretch / k * (1.0 + 1e-6);
+        Ok(Self { linear, translation: m.translation, inverse, normal, longest_preimage, uniform })
     }
 
     /// The linear part.
@@ -113,7 +117,15 @@ impl Transform {
     /// The same transform for an object measured in units of `s`, a power of two: exact.
     #[must_use]
     pub fn with_object_scale(&self, s: f64) -> Self {
-        Self { linear: self.linear * s, inverse: self.inverse * (1.0 / s), ..*self }
+        let longest_preimage = self.longest_preimage / s;
+        Self { linear: self.linear * s, inverse: self.inverse * (1.0 / s), longest_preimage, ..*self }
+    }
+
+    /// How long a vector of the object's space may be, of those that are as long as 1 in the world: the 2-norm of the
+    /// inverse, rounded up.
+    #[must_use]
+    pub fn longest_preimage(&self) -> f64 {
+        self.longest_preimage
     }
 
     /// A point to the world. Error: see [`Transform::point_error`].

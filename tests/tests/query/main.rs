@@ -7,10 +7,12 @@ mod guards;
 mod hard;
 mod invariance;
 mod leaks;
+mod nearest;
 mod packets;
 mod rays;
 mod shapes;
 mod single;
+mod solid;
 mod spawn;
 mod twins;
 

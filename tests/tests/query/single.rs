@@ -7,12 +7,12 @@ use proptest::prelude::*;
 
 use crate::bits;
 
-fn vector() -> impl Strategy<Value = DVec3> {
+pub(super) fn vector() -> impl Strategy<Value = DVec3> {
     [-1.0..1.0f64, -1.0..1.0, -1.0..1.0].prop_map(DVec3::from)
 }
 
 /// Triangles of any size, slivers among them, some twice; all of one scale.
-fn mesh() -> impl Strategy<Value = (Vec<Vec3>, Vec<[u32; 3]>)> {
+pub(super) fn mesh() -> impl Strategy<Value = (Vec<Vec3>, Vec<[u32; 3]>)> {
     let triangle = (vector(), vector(), vector(), prop::sample::select(vec![1.0, 0.1, 1e-3, 1e-6]), 0..4, 0.0..1.0f64);
     let scale = prop::sample::select(vec![1.0f32, 1e-6, 1e6, 1e-20, 3e10]);
     (prop::collection::vec(triangle, 1..60), scale, prop::bool::ANY).prop_map(|(corners, scale, twice)| {
@@ -32,7 +32,7 @@ fn mesh() -> impl Strategy<Value = (Vec<Vec3>, Vec<[u32; 3]>)> {
 }
 
 /// None, even, mirrored, and of all kinds.
-fn place() -> impl Strategy<Value = DAffine3> {
+pub(super) fn place() -> impl Strategy<Value = DAffine3> {
     let size = prop::sample::select(vec![
         (DVec3::ONE, false),
         (DVec3::splat(0.37), false),

@@ -77,6 +77,17 @@ impl<R: Real> Bvh2<R> {
         if whole > 0.0 { 1.0 + below / whole } else { 1.0 }
     }
 
+    /// Where to begin; `None` when there is nothing.
+    pub(crate) fn first(&self) -> Option<Child> {
+        self.root
+    }
+
+    /// What is below a node, with its boxes.
+    pub(crate) fn below(&self, index: u32) -> [(Child, Aabb<R>); 2] {
+        let node = &self.nodes[index as usize];
+        [(node.children[0], node.child_box(0)), (node.children[1], node.child_box(1))]
+    }
+
     /// Memory of the nodes.
     pub(crate) fn bytes(&self) -> usize {
         size_of_val(self.nodes.as_slice())

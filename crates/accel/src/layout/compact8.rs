@@ -7,7 +7,7 @@
 use glam::Vec3;
 
 use super::wide8::{self, Reference, Wide8};
-use crate::simd::Lanes;
+use crate::simd::{Lanes, Row};
 use crate::wide::{Axis, BoxNode, Leaf, WideTree};
 
 /// Different vertices in a leaf at most: what two registers hold.
@@ -103,6 +103,27 @@ impl BoxNode for Node {
         (
             L::load_bytes(&self.planes, ray.entry).mul_add(step, near),
             L::load_bytes(&self.planes, ray.exit).mul_add(step, far),
+        )
+    }
+
+    #[inline(always)]
+    fn corners<L: Lanes>(&self) -> ([L; 3], [L; 3]) {
+        let (o, s) = (&self.origin, &self.steps);
+        let [ox, oy, oz] = [L::splat(o[0]), L::splat(o[1]), L::splat(o[2])];
+        let [sx, sy, sz] = [L::splat(s[0]), L::splat(s[1]), L::splat(s[2])];
+        let p = &self.planes;
+        const ROW: [Row; 6] = [Row::new(0), Row::new(1), Row::new(2), Row::new(3), Row::new(4), Row::new(5)];
+        (
+            [
+                L::load_bytes(p, ROW[0]).mul_add(sx, ox),
+                L::load_bytes(p, ROW[2]).mul_add(sy, oy),
+                L::load_bytes(p, ROW[4]).mul_add(sz, oz),
+            ],
+            [
+                L::load_bytes(p, ROW[1]).mul_add(sx, ox),
+                L::load_bytes(p, ROW[3]).mul_add(sy, oy),
+                L::load_bytes(p, ROW[5]).mul_add(sz, oz),
+            ],
         )
     }
 

@@ -273,6 +273,12 @@ impl BoxNode for Node {
     }
 
     #[inline(always)]
+    fn corners<L: Lanes>(&self) -> ([L; 3], [L; 3]) {
+        let [lx, hx, ly, hy, lz, hz] = &self.planes;
+        ([L::load(lx), L::load(ly), L::load(lz)], [L::load(hx), L::load(hy), L::load(hz)])
+    }
+
+    #[inline(always)]
     fn there(&self, hits: u32) -> u32 {
         hits
     }

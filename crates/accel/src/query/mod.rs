@@ -4,10 +4,12 @@ mod all_hits;
 mod any_hit;
 mod batch;
 mod closest_hit;
+mod closest_point;
 mod count_hits;
 mod crossings;
 mod decision;
 mod direct;
+mod nearest_k;
 
 use core::ops::ControlFlow;
 
@@ -18,6 +20,7 @@ pub(crate) use all_hits::All;
 pub use all_hits::HitLists;
 pub(crate) use any_hit::Any;
 pub(crate) use closest_hit::Closest;
+pub use closest_point::ClosestPoint;
 pub use crossings::Crossings;
 pub(crate) use direct::ForKernel;
 

@@ -144,6 +144,47 @@ impl Top<'_, u64> {
         }
     }
 
+    /// The same as [`Top::push_all_but_nearest`] without a branch, for nodes of which most children are visited: how many
+    /// those are is not to be predicted.
+    ///
+    /// # Panics
+    /// As [`Top::push`].
+    #[inline(always)]
+    pub(crate) fn push_sorted(mut self, keys: [u64; 8], n: usize) -> u64 {
+        static UNUSED: [[u64; 8]; 9] = {
+            let mut masks = [[0; 8]; 9];
+            let mut n = 0;
+            while n < 9 {
+                let mut k = 0;
+                while k < n && k < 8 {
+                    masks[n][k] = u64::MAX;
+                    k += 1;
+                }
+                n += 1;
+            }
+            masks
+        };
+        // What follows the keys becomes 0, and the last.
+        let mask = &UNUSED[n.min(8)];
+        let [a, b, c, d, e, f, g, h] = keys;
+        let (a, b, c, d) = (a & mask[0], b & mask[1], c & mask[2], d & mask[3]);
+        let (e, f, g, h) = (e & mask[4], f & mask[5], g & mask[6], h & mask[7]);
+        // Batcher's network of 19 comparisons (Knuth, TAOCP volume 3, section 5.3.4), the larger first.
+        let ((b, a), (d, c), (f, e), (h, g)) = (order(a, b), order(c, d), order(e, f), order(g, h));
+        let ((c, a), (d, b), (g, e), (h, f)) = (order(a, c), order(b, d), order(e, g), order(f, h));
+        let ((c, b), (g, f)) = (order(b, c), order(f, g));
+        let ((e, a), (f, b), (g, c), (h, d)) = (order(a, e), order(b, f), order(c, g), order(d, h));
+        let ((e, c), (f, d)) = (order(c, e), order(d, f));
+        let ((c, b), (e, d), (g, f)) = (order(b, c), order(d, e), order(f, g));
+        self.reborrow().push(&[a, b, c, d, e, f, g, h], n);
+        self.pop().unwrap_or(0)
+    }
+
+    #[inline(always)]
+    fn reborrow(&mut self) -> Top<'_, u64> {
+        Top { entries: self.entries, len: self.len }
+    }
+
     /// Puts these on top, the last of them topmost.
     ///
     /// # Panics
@@ -204,6 +245,9 @@ mod tests {
             sorted.sort_unstable();
             let mut stack = Stack::new();
             let mut got = vec![stack.top().push_all_but_nearest(keys, n, false)];
+            got.extend(core::iter::from_fn(|| stack.top().pop()));
+            prop_assert_eq!(&got, &sorted);
+            got = vec![stack.top().push_sorted(keys, n)];
             got.extend(core::iter::from_fn(|| stack.top().pop()));
             prop_assert_eq!(&got, &sorted);
             got = vec![stack.top().push_all_but_nearest(keys, n, true)];

@@ -37,6 +37,8 @@ pub(crate) trait BoxNode {
     fn children(&self) -> &[u32; 8];
     /// Where the ray enters and leaves the slabs of one axis.
     fn slabs<L: Lanes>(&self, axis: usize, ray: &Axis<L>) -> (L, L);
+    /// Lower and upper corners of the boxes: those of a compact node off by rounding.
+    fn corners<L: Lanes>(&self) -> ([L; 3], [L; 3]);
     /// Those of the hits whose child is there.
     fn there(&self, hits: u32) -> u32;
 }

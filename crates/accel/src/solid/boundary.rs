@@ -1,0 +1,71 @@
+//! Where a mesh ends.
+
+use std::collections::HashMap;
+
+use firsthit_geometry::transform::Transform;
+use glam::{DVec3, Vec3};
+
+use crate::model::Model;
+
+/// The edges at which a mesh ends.
+#[derive(Clone, Debug)]
+pub(super) struct Boundary {
+    /// Whether each edge has an even number of triangles.
+    pub(super) closed: bool,
+    /// Both ends, normalised, in the direction in which more triangles run through it than in the other, and how many more.
+    pub(super) edges: Vec<([Vec3; 2], u32)>,
+}
+
+impl Boundary {
+    /// Vertices are one where their positions are.
+    pub(super) fn new(model: &Model) -> Self {
+        let mut ids = HashMap::new();
+        let mut points: Vec<Vec3> = Vec::new();
+        let mut edges: Vec<([u32; 2], bool)> = Vec::new();
+        model.each_triangle(|_, corners| {
+            let [a, b, c] = corners.map(|p| {
+                // -0 is 0.
+                *ids.entry(p.to_array().map(|x| (x + 0.0).to_bits())).or_insert_with(|| {
+                    points.push(p);
+                    points.len() as u32 - 1
+                })
+            });
+            edges.extend([(a, b), (b, c), (c, a)].map(|(u, v)| ([u.min(v), u.max(v)], u < v)));
+        });
+        edges.sort_unstable();
+        let mut boundary = Self { closed: true, edges: Vec::new() };
+        for same in edges.chunk_by(|x, y| x.0 == y.0) {
+            let ([low, high], _) = same[0];
+            let upward = same.iter().filter(|(_, up)| *up).count();
+            let downward = same.len() - upward;
+            boundary.closed &= same.len() % 2 == 0;
+            let ends = [points[low as usize], points[high as usize]];
+            if upward > downward {
+                boundary.edges.push((ends, (upward - downward) as u32));
+            } else if downward > upward {
+                boundary.edges.push(([ends[1], ends[0]], (downward - upward) as u32));
+            }
+        }
+        boundary
+    }
+
+    /// What the cone from the boundary to infinity, in a direction, takes from the solid angle around a point: the sum over its edges
+    /// of the spherical triangles with that direction (van Oosterom and Strackee 1983), signed.
+    pub(super) fn solid_angle(&self, transform: &Transform, point: DVec3, apex: DVec3) -> f64 {
+        let (linear, offset) = (transform.linear(), transform.translation() - point);
+        let apex = apex.normalize_or_zero();
+        let sum: f64 = self
+            .edges
+            .iter()
+            .map(|(ends, times)| {
+                let [a, b] = ends.map(|p| linear * p.as_dvec3() + offset);
+                let (la, lb) = (a.length(), b.length());
+                let volume = a.cross(b).dot(apex);
+                let around = la * lb + a.dot(b) + b.dot(apex) * la + apex.dot(a) * lb;
+                2.0 * volume.atan2(around) * f64::from(*times)
+            })
+            .sum();
+        // A mirrored mesh keeps its outside.
+        if linear.determinant() < 0.0 { -sum } else { sum }
+    }
+}

@@ -1,0 +1,181 @@
+//! Inside and outside are told alike by all methods where they apply, and winding numbers are those of the slow twin.
+
+use firsthit_accel::{BuildOptions, Geometry, Layout, SceneBuilder, SignMethod, Solid, reference};
+use firsthit_geometry::Precision;
+use firsthit_tests::oracle::read_obj;
+use glam::{DAffine3, DVec3, Vec3};
+use proptest::prelude::*;
+
+use crate::single::{mesh, place, vector};
+use crate::triangles;
+
+const CUBE: [[u32; 3]; 12] = [
+    [0, 2, 1],
+    [1, 2, 3],
+    [4, 5, 6],
+    [5, 7, 6],
+    [0, 1, 4],
+    [1, 5, 4],
+    [2, 6, 3],
+    [3, 6, 7],
+    [0, 4, 2],
+    [2, 4, 6],
+    [1, 3, 5],
+    [3, 7, 5],
+];
+
+fn cube(triangles: &[[u32; 3]]) -> Geometry {
+    let corner = |i: u32| Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32);
+    Geometry::Triangles { positions: (0..8).map(corner).collect(), triangles: triangles.to_vec() }
+}
+
+const METHODS: [SignMethod; 6] = [
+    SignMethod::Winding,
+    SignMethod::FastWinding { accuracy: 2.0 },
+    SignMethod::Parity { votes: 1 },
+    SignMethod::Parity { votes: 5 },
+    SignMethod::Pseudonormal,
+    SignMethod::Exact,
+];
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    /// A placed cube: inside is what is within 0 and 1 of its own coordinates.
+    #[test]
+    fn all_methods_know_a_cube(place in place(), points in prop::collection::vec(vector(), 30), aimed in 0..8usize) {
+        let to_object = place.inverse();
+        for precision in Precision::ALL {
+            for layout in Layout::ALL {
+                let mut builder = SceneBuilder::new(BuildOptions { precision, layout, ..BuildOptions::default() });
+                let mesh = builder.add_mesh(vec![cube(&CUBE)]);
+                builder.add_instance(mesh, place);
+                let scene = builder.build().map_err(|e| TestCaseError::fail(e.to_string()))?;
+                prop_assert_eq!(Solid::new(&scene).method(), SignMethod::Winding);
+                for method in METHODS {
+                    let solid = Solid::with_method(&scene, method);
+                    prop_assert!(solid.is_watertight() && solid.boundary_edges() == 0);
+                    for p in &points {
+                        // Some lie where edges and faces go on, or beside corners.
+                        let mut local = *p * 1.5 + 0.5;
+                        for axis in 0..3 {
+                            if aimed >> axis & 1 == 1 && local.to_array().iter().any(|x| !(-0.01..1.01).contains(x)) {
+                                local[axis] = local[axis].round();
+                            }
+                        }
+                        let p = place.transform_point3(local);
+                        let local = to_object.transform_point3(p);
+                        // Not on the surface, as far as can be told.
+                        let margin = local.to_array().map(|x| x.abs().min((x - 1.0).abs())).into_iter().fold(1.0, f64::min);
+                        let inside = local.cmpgt(DVec3::ZERO).all() && local.cmplt(DVec3::ONE).all();
+                        let outside = local.cmplt(DVec3::splat(-1e-3)).any() || local.cmpgt(DVec3::splat(1.001)).any();
+                        if margin < 1e-3 && !outside {
+                            continue;
+                        }
+                        prop_assert_eq!(solid.contains(p), inside, "{:?} {:?} {:?} {}", precision, layout, method, local);
+                        let distance = scene.distance(p);
+                        prop_assert_eq!(solid.signed_distance(p), if inside { -distance } else { distance });
+                    }
+                }
+            }
+        }
+    }
+
+    /// Of anything at all, mirrored and stretched, several times.
+    #[test]
+    fn winding_numbers_are_those_of_the_slow_twin(
+        (positions, indices) in mesh(), places in prop::collection::vec(place(), 1..4), points in prop::collection::vec(vector(), 20),
+    ) {
+        let mut builder = SceneBuilder::default();
+        let mesh = builder.add_mesh(vec![Geometry::Triangles { positions, triangles: indices }]);
+        for place in &places {
+            builder.add_instance(mesh, *place);
+        }
+        let scene = builder.build().map_err(|e| TestCaseError::fail(e.to_string()))?;
+        let solid = Solid::with_method(&scene, SignMethod::Winding);
+        let bounds = scene.bounds();
+        for p in points {
+            let p = bounds.center() + p * bounds.extent();
+            let expected = reference::winding_number(&scene, p);
+            let got = solid.winding_number(p);
+            // Close to a sheet it changes by 1.
+            if scene.distance(p) > 1e-6 * bounds.extent().max_element() {
+                prop_assert!((got - expected).abs() < 1e-6, "{} {}", got, expected);
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_not_finite_is_not_inside() {
+    let mut builder = SceneBuilder::default();
+    let mesh = builder.add_mesh(vec![cube(&CUBE)]);
+    builder.add_instance(mesh, DAffine3::IDENTITY);
+    let scene = builder.build().expect("a cube");
+    for method in METHODS {
+        let solid = Solid::with_method(&scene, method);
+        for p in [DVec3::NAN, DVec3::new(0.5, f64::INFINITY, 0.5)] {
+            assert!(!solid.contains(p) && solid.winding_number(p).is_nan() && solid.signed_distance(p).is_nan());
+        }
+        assert!(!solid.contains(DVec3::splat(1e300)));
+    }
+    let nothing = Solid::new(&SceneBuilder::default().build().expect("nothing"));
+    assert!(!nothing.contains(DVec3::ZERO) && nothing.signed_distance(DVec3::ZERO) == f64::INFINITY);
+}
+
+#[test]
+fn the_default_suits_the_mesh() {
+    let solid = |triangles: &[[u32; 3]]| {
+        let mut builder = SceneBuilder::default();
+        let mesh = builder.add_mesh(vec![cube(triangles)]);
+        builder.add_instance(mesh, DAffine3::IDENTITY);
+        Solid::new(&builder.build().expect("a cube"))
+    };
+    let middle = DVec3::new(0.5, 0.45, 0.55);
+    // Inside out it has the same inside.
+    let turned: Vec<_> = CUBE.iter().map(|&[a, b, c]| [a, c, b]).collect();
+    assert!(solid(&turned).contains(middle) && solid(&turned).winding_number(middle) == -1.0);
+    // One triangle turned.
+    let mut mixed = CUBE;
+    mixed[3].swap(0, 1);
+    let mixed = solid(&mixed);
+    assert_eq!((mixed.method(), mixed.is_watertight()), (SignMethod::Parity { votes: 1 }, true));
+    assert!(mixed.contains(middle) && !mixed.contains(middle + DVec3::X));
+    // Without a face it has a lid all the same.
+    let open = solid(&CUBE[2..]);
+    assert_eq!((open.method(), open.is_watertight(), open.boundary_edges()), (SignMethod::Winding, false, 4));
+    assert!((open.winding_number(middle) - reference::winding_number(open.scene(), middle)).abs() < 1e-12);
+    assert!(open.contains(middle) && !open.contains(DVec3::new(0.5, 0.5, -0.5)) && !open.contains(DVec3::splat(3.0)));
+}
+
+/// The bunny has holes: winding numbers against the sum over all its triangles; the fast way is close to them.
+#[test]
+fn the_open_bunny() {
+    let Some(shared) = firsthit_tests::shared() else { return };
+    let bunny = read_obj(&shared.join("assets/stanford-bunny/stanford-bunny.obj")).expect("the bunny");
+    let mut builder = SceneBuilder::default();
+    let mesh = builder.add_mesh(vec![triangles(&bunny)]);
+    builder.add_instance(mesh, DAffine3::IDENTITY);
+    let scene = builder.build().expect("the bunny");
+    let solid = Solid::new(&scene);
+    assert_eq!((solid.method(), solid.boundary_edges()), (SignMethod::Winding, 223));
+    let fast = Solid::with_method(&scene, SignMethod::FastWinding { accuracy: 2.0 });
+    let bounds = scene.bounds();
+    let (mut inside, mut worst, mut count) = (0, 0.0f64, 0);
+    for i in 0..1000u32 {
+        // A sequence that fills space (Roberts 2018).
+        let k = f64::from(i);
+        let at = DVec3::new(k * 0.819_172_513, k * 0.671_043_606, k * 0.549_700_478).fract();
+        let p = bounds.min + bounds.extent() * at;
+        let expected = reference::winding_number(&scene, p);
+        assert!((solid.winding_number(p) - expected).abs() < 1e-9, "{p}");
+        worst = worst.max((fast.winding_number(p) - expected).abs());
+        assert_eq!(solid.contains(p), expected > 0.5, "{p}");
+        inside += u32::from(solid.contains(p));
+        count += 1;
+    }
+    assert!(worst < 0.1 && (200..600).contains(&inside), "{worst} {inside}");
+    firsthit_tests::summary(&format!(
+        "winding numbers of the open bunny: {count} points, {inside} inside; fast: {worst:.4} off at most"
+    ));
+}
