@@ -108,7 +108,7 @@ pub(crate) enum Command {
 #[derive(Args, Debug)]
 #[command(args_override_self = true, after_help = RENDER_EXAMPLES, next_line_help = false)]
 pub(crate) struct RenderArgs {
-    /// The model or scene: .obj, .obj.zst, .gltf, .glb, .toml, .json
+    /// The model or scene: .obj, .ply, .stl, .gltf, .glb, .toml, .json (also with .zst, .gz)
     #[arg(value_name = "MODEL")]
     pub(crate) model: PathBuf,
 
@@ -402,7 +402,7 @@ pub(crate) struct MergeArgs {
 #[derive(Args, Debug)]
 #[command(args_override_self = true, after_help = INSPECT_EXAMPLES)]
 pub(crate) struct InspectArgs {
-    /// The model or scene: .obj, .obj.zst, .gltf, .glb, .toml, .json
+    /// The model or scene: .obj, .ply, .stl, .gltf, .glb, .toml, .json (also with .zst, .gz)
     #[arg(value_name = "MODEL")]
     pub(crate) model: PathBuf,
 

@@ -117,8 +117,8 @@ impl Folder {
 /// [`ErrorKind::Invalid`] if the compressed data are damaged.
 pub(crate) fn read(path: &Path, limits: &Limits) -> Result<Vec<u8>, ImportError> {
     let at = |kind| ImportError::new(path, "", kind);
-    let too_large = |after: &str| {
-        at(ErrorKind::Limit(format!("more than {} bytes{after}, the most that is read", limits.file_bytes)))
+    let too_large = |limit: u64, after: &str| {
+        at(ErrorKind::Limit(format!("more than {limit} bytes{after}, the most that is read")))
     };
     let meta = fs::metadata(path).map_err(|e| ImportError::io(path, e))?;
     if !meta.is_file() {
@@ -127,14 +127,20 @@ pub(crate) fn read(path: &Path, limits: &Limits) -> Result<Vec<u8>, ImportError>
         return Err(ImportError::io(path, io::Error::new(io::ErrorKind::InvalidInput, cause)));
     }
     if meta.len() > limits.file_bytes {
-        return Err(too_large(""));
+        return Err(too_large(limits.file_bytes, ""));
     }
     let file = File::open(path).map_err(|e| ImportError::io(path, e))?;
     let damaged = |e: io::Error| at(ErrorKind::Invalid(format!("damaged compressed data: {e}")));
     let mut bytes = Vec::new();
+    let compression = compression(path);
+    let limit = match compression {
+        Compression::None => limits.file_bytes,
+        // A small file that becomes a huge one is no model.
+        Compression::Gzip | Compression::Zstandard => limits.decompressed(meta.len()),
+    };
     // One byte more than allowed tells "all of it" from "too much".
-    let most = limits.file_bytes.saturating_add(1);
-    match compression(path) {
+    let most = limit.saturating_add(1);
+    match compression {
         Compression::None => {
             bytes.reserve_exact(usize::try_from(meta.len()).unwrap_or(0));
             file.take(most).read_to_end(&mut bytes).map_err(|e| ImportError::io(path, e))?;
@@ -149,8 +155,8 @@ pub(crate) fn read(path: &Path, limits: &Limits) -> Result<Vec<u8>, ImportError>
             decoder.take(most).read_to_end(&mut bytes).map_err(damaged)?;
         }
     }
-    if bytes.len() as u64 > limits.file_bytes {
-        return Err(too_large(" after decompression"));
+    if bytes.len() as u64 > limit {
+        return Err(too_large(limit, " after decompression"));
     }
     Ok(bytes)
 }
@@ -162,6 +168,15 @@ pub(crate) fn format_extension(path: &Path) -> String {
         _ => path.file_stem().and_then(|s| Path::new(s).extension()),
     };
     inner.and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase()
+}
+
+/// The file's name without the extensions of its format and compression.
+pub(crate) fn stem(path: &Path) -> String {
+    let name = match compression(path) {
+        Compression::None => path.file_stem(),
+        _ => path.file_stem().and_then(|s| Path::new(s).file_stem()),
+    };
+    name.unwrap_or_default().to_string_lossy().into_owned()
 }
 
 enum Compression {
@@ -308,6 +323,20 @@ mod tests {
     }
 
     #[test]
+    fn a_small_file_may_not_become_a_huge_one() {
+        use std::io::Write;
+        let dir = tempfile::tempdir().expect("temporary folder");
+        let gz = dir.path().join("a.obj.gz");
+        let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        (0..300).for_each(|_| encoder.write_all(&[b' '; 1 << 20]).expect("in memory"));
+        fs::write(&gz, encoder.finish().expect("in memory")).expect("file");
+        let e = read(&gz, &Limits { expansion: 4, ..Limits::default() }).expect_err("300 MiB of 1.3");
+        assert!(matches!(e.kind, ErrorKind::Limit(_)) && e.to_string().contains("after decompression"), "{e}");
+        let allowed = Limits { expansion: 1000, ..Limits::default() };
+        assert_eq!(read(&gz, &allowed).expect("allowed").len(), 300 << 20);
+    }
+
+    #[test]
     fn compressed_files_are_read_up_to_the_limit() {
         use std::io::Write;
         let dir = tempfile::tempdir().expect("temporary folder");
@@ -324,6 +353,9 @@ mod tests {
             let small = Limits { file_bytes: 99_999, ..Limits::default() };
             assert!(matches!(read(path, &small), Err(ImportError { kind: ErrorKind::Limit(_), .. })));
             assert_eq!(format_extension(path), "obj");
+            // Within what any file may become.
+            let tight = Limits { expansion: 0, ..Limits::default() };
+            assert_eq!(read(path, &tight).expect("within the free share"), text);
             let whole = fs::read(path).expect("readable");
             fs::write(path, &whole[..whole.len() / 2]).expect("file");
             assert!(matches!(read(path, &Limits::default()), Err(ImportError { kind: ErrorKind::Invalid(_), .. })));

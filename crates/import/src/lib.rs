@@ -6,9 +6,13 @@
 //!
 //! | format | module |
 //! |---|---|
-//! | OBJ with MTL (`.obj`, `.obj.zst`) | [`obj`] |
+//! | OBJ with MTL (`.obj`) | [`obj`] |
+//! | PLY (`.ply`) | [`ply`] |
+//! | STL (`.stl`) | [`stl`] |
 //! | glTF 2.0 (`.gltf`, `.glb`) | [`gltf`] |
 //! | firsthit scene files (`.toml`, `.json`) | [`toml`] |
+//!
+//! All of them may be compressed: `.obj.zst`, `.ply.gz`.
 #![forbid(unsafe_code)]
 
 mod bake;
@@ -21,9 +25,12 @@ mod limits;
 pub mod obj;
 mod open;
 mod place;
+mod plain;
+pub mod ply;
 mod report;
 pub mod scene;
 pub mod srgb;
+pub mod stl;
 #[cfg(test)]
 mod tests;
 pub mod toml;

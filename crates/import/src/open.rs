@@ -9,7 +9,7 @@ use glam::{DAffine3, DMat3, DVec3};
 
 use crate::scene::SurfaceDesc;
 use crate::toml::Inclusion;
-use crate::{ErrorKind, ImportError, Limits, Report, SceneDesc, files, gltf, obj, toml};
+use crate::{ErrorKind, ImportError, Limits, Report, SceneDesc, files, gltf, obj, ply, stl, toml};
 
 /// Which axis of the file points up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -143,12 +143,15 @@ impl Imported {
 pub(crate) enum Format {
     Obj,
     Gltf,
+    Ply,
+    Stl,
     Toml,
     /// glTF or a scene file.
     Json,
 }
 
-const FORMATS: &str = "firsthit reads .obj (also .obj.zst and .obj.gz), .gltf, .glb, and scene files (.toml, .json)";
+const FORMATS: &str =
+    "firsthit reads .obj, .ply, .stl, .gltf, .glb, scene files (.toml, .json), and all of these with .zst or .gz";
 
 impl Format {
     /// Tells a file's format by its extension, where that is not enough by its first bytes.
@@ -159,15 +162,19 @@ impl Format {
         match files::format_extension(file).as_str() {
             "obj" => Ok(Self::Obj),
             "gltf" | "glb" => Ok(Self::Gltf),
+            "ply" => Ok(Self::Ply),
+            "stl" => Ok(Self::Stl),
             "toml" => Ok(Self::Toml),
             "json" => Ok(Self::Json),
             other => {
                 let mut start = Vec::new();
                 if meta.is_file() {
-                    File::open(file).and_then(|f| f.take(4).read_to_end(&mut start)).map_err(io)?;
+                    File::open(file).and_then(|f| f.take(84).read_to_end(&mut start)).map_err(io)?;
                 }
                 match other {
-                    _ if start == b"glTF" => Ok(Self::Gltf),
+                    _ if start.starts_with(b"glTF") => Ok(Self::Gltf),
+                    _ if ply::is_ply(&start) => Ok(Self::Ply),
+                    _ if stl::is_ascii(&start) || stl::is_binary_of(&start, meta.len()) => Ok(Self::Stl),
                     "" => Err(ImportError::unsupported(file, "", format!("the file name has no extension; {FORMATS}"))),
                     _ => Err(ImportError::unsupported(file, "", format!("'.{other}' files are not read; {FORMATS}"))),
                 }
@@ -190,7 +197,12 @@ pub(crate) fn read_as(
         return Err(ImportError::unsupported(file, "", cause));
     }
     match format {
+        // Whatever it is called.
+        Format::Obj | Format::Stl if ply::is_ply(&bytes) => ply::read_bytes(&bytes, file, options),
         Format::Obj => obj::read_bytes(bytes, file, options),
+        Format::Ply if stl::is_ascii(&bytes) => stl::read_bytes(&bytes, file, options),
+        Format::Ply => ply::read_bytes(&bytes, file, options),
+        Format::Stl => stl::read_bytes(&bytes, file, options),
         Format::Gltf => gltf::read_bytes(&bytes, file, options),
         Format::Json if is_gltf => gltf::read_bytes(&bytes, file, options),
         Format::Toml | Format::Json => toml::read_bytes(&bytes, file, options, including),
@@ -217,7 +229,7 @@ fn only_model(folder: &Path) -> Result<PathBuf, ImportError> {
     for entry in fs::read_dir(folder).map_err(io)? {
         let path = entry.map_err(io)?.path();
         // Not .toml: other programs have files of that name beside their models.
-        if matches!(files::format_extension(&path).as_str(), "obj" | "gltf" | "glb") && path.is_file() {
+        if matches!(files::format_extension(&path).as_str(), "obj" | "gltf" | "glb" | "ply" | "stl") && path.is_file() {
             models.push(path);
         }
     }

@@ -4,6 +4,7 @@ mod basisu;
 mod draco;
 mod instancing;
 mod meshopt;
+mod ply_stl;
 
 use std::collections::HashMap;
 use std::fs;

@@ -31,7 +31,7 @@ measured so far is printed).";
 #[command(args_override_self = true, after_help = EXAMPLES)]
 #[command(group = ArgGroup::new("what").required(true).multiple(true).args(["models", "builtin", "corpus", "scenarios"]))]
 pub(crate) struct AccuracyArgs {
-    /// Models to measure: .obj, .obj.zst, .gltf, .glb, .toml, .json
+    /// Models to measure: .obj, .ply, .stl, .gltf, .glb, .toml, .json (also with .zst, .gz)
     #[arg(value_name = "MODEL")]
     pub(crate) models: Vec<PathBuf>,
 

@@ -31,7 +31,7 @@ Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted (what was measured 
 #[command(args_override_self = true, after_help = EXAMPLES)]
 #[command(group = ArgGroup::new("what").required(true).multiple(true).args(["models", "builtin", "render"]))]
 pub(crate) struct BenchArgs {
-    /// Models to measure: .obj, .obj.zst, .gltf, .glb, .toml, .json, or a folder with one of them
+    /// Models to measure: .obj, .ply, .stl, .gltf, .glb, .toml, .json (also with .zst, .gz), or a folder with one of them
     #[arg(value_name = "MODEL")]
     pub(crate) models: Vec<PathBuf>,
 

@@ -76,7 +76,7 @@ pub(crate) struct QueryArgs {
     #[arg(value_name = "QUESTION", value_enum, hide_possible_values = false)]
     pub(crate) question: Question,
 
-    /// The model or scene: .obj, .obj.zst, .gltf, .glb, .toml, .json
+    /// The model or scene: .obj, .ply, .stl, .gltf, .glb, .toml, .json (also with .zst, .gz)
     #[arg(value_name = "MODEL")]
     pub(crate) model: PathBuf,
 

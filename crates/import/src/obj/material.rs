@@ -28,7 +28,7 @@ const NEUTRAL: Vec3 = Vec3::splat(0.8);
 /// A material for surfaces that have none: matt plastic.
 ///
 /// White with vertex colours, which then show as they are; else grey.
-pub(super) fn neutral(name: &str, has_colors: bool) -> MaterialDesc {
+pub(crate) fn neutral(name: &str, has_colors: bool) -> MaterialDesc {
     let pbr = PbrMaterial {
         base_color: if has_colors { Vec3::ONE } else { NEUTRAL }.extend(1.0),
         metallic: 0.0,

@@ -6,21 +6,23 @@ use std::path::Path;
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
 use super::normals;
-use super::parse::{Corner, Model, NONE, place};
+use super::parse::{Corner, Model, NONE};
 use super::polygon::{Outcome, Triangulator};
 use crate::scene::TriangleMesh;
 use crate::{Report, srgb};
 
 /// The triangles of all parts of a model.
-pub(super) struct Meshes {
+pub(crate) struct Meshes {
     /// One for each of [`Model::parts`].
-    pub(super) parts: Vec<TriangleMesh>,
+    pub(crate) parts: Vec<TriangleMesh>,
     /// Where in the model the origin of the meshes is.
-    pub(super) origin: DVec3,
+    pub(crate) origin: DVec3,
 }
 
-/// Makes the meshes. Triangles keep the order of the faces within each part.
-pub(super) fn build(model: &mut Model, file: &Path, report: &mut Report) -> Meshes {
+/// Makes the meshes. Triangles keep the order of the faces within each part. `unit` is what [`Face::line`] counts.
+///
+/// [`Face::line`]: super::Face::line
+pub(crate) fn build(model: &mut Model, file: &Path, unit: &str, report: &mut Report) -> Meshes {
     let face_normals = normals::complete(model);
     let colors = linear_colors(model, file, report);
     let mut builder = Builder {
@@ -40,12 +42,12 @@ pub(super) fn build(model: &mut Model, file: &Path, report: &mut Report) -> Mesh
     let parts = faces_of.iter().map(|faces| builder.part(faces)).collect();
     let (degenerate, line) = builder.degenerate;
     if degenerate > 0 {
-        report.warn(file, place(line), format!("{degenerate} faces without area"));
+        report.warn(file, format!("{unit} {line}"), format!("{degenerate} faces without area"));
     }
     let (too_large, line) = builder.too_large;
     if too_large > 0 {
         let message = format!("{too_large} concave polygons with too many corners; cut into fans, which may be wrong");
-        report.warn(file, place(line), message);
+        report.warn(file, format!("{unit} {line}"), message);
     }
     Meshes { parts, origin: builder.origin }
 }

@@ -56,7 +56,7 @@
 //! hold the two against each other where tobj can read a file.
 
 mod material;
-mod mesh;
+pub(crate) mod mesh;
 mod mtl;
 mod normals;
 mod parse;
@@ -69,7 +69,9 @@ use std::path::Path;
 
 use glam::DAffine3;
 
-use self::parse::Model;
+pub(crate) use self::material::neutral;
+pub(crate) use self::parse::{Corner, Face, Model, NONE, Part};
+pub(crate) use self::text::number;
 use crate::files::{self, Folder};
 use crate::scene::{GeometryDesc, ImageDesc, InstanceDesc, MaterialDesc, MeshDesc, SurfaceDesc};
 use crate::{ImportError, Imported, Options, Report, SceneDesc};
@@ -105,9 +107,9 @@ pub fn read_bytes(bytes: Vec<u8>, path: impl AsRef<Path>, options: &Options) -> 
     let text = text::to_utf8(bytes);
     let mut model = parse::parse(&text, path, &options.limits, &mut report)?;
     drop(text);
-    let meshes = mesh::build(&mut model, path, &mut report);
+    let meshes = mesh::build(&mut model, path, "line", &mut report);
     let materials = Materials::load(&model, path, options, &mut report);
-    let name = scene_name(path);
+    let name = files::stem(path);
     report.triangles_all_scenes = meshes.parts.iter().map(|m| m.triangles.len() as u64).sum();
     let geometries = model.parts.iter().zip(meshes.parts).map(|(part, mesh)| {
         let name = match (part.object.as_str(), part.group.as_str()) {
@@ -164,7 +166,7 @@ impl Materials {
         let of_name = model.materials.iter().map(|(line, name)| {
             found.get(mtl::key(name)).copied().unwrap_or_else(|| {
                 missing.push((*line, name));
-                materials.push(material::neutral(name, has_colors));
+                materials.push(neutral(name, has_colors));
                 materials.len() - 1
             })
         });
@@ -176,18 +178,11 @@ impl Materials {
             report.warn(path, parse::place(*line), message);
         }
         let none = model.parts.iter().any(|p| p.material.is_none()).then(|| {
-            materials.push(material::neutral("", has_colors));
+            materials.push(neutral("", has_colors));
             materials.len() - 1
         });
         Self { materials, images, of_name, none }
     }
-}
-
-/// The file's name without `.obj` and what may follow it.
-fn scene_name(path: &Path) -> String {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let end = name.to_ascii_lowercase().rfind(".obj").unwrap_or(name.len());
-    name.get(..end).unwrap_or_default().to_owned()
 }
 
 #[cfg(test)]

@@ -7,56 +7,56 @@ use super::text::{Lines, name, number, split_keyword, words};
 use crate::{ErrorKind, ImportError, Limits, Report};
 
 /// No index.
-pub(super) const NONE: u32 = u32::MAX;
+pub(crate) const NONE: u32 = u32::MAX;
 
 /// What an OBJ file says, with absolute indices from 0, all of them in range.
 #[derive(Debug, Default)]
-pub(super) struct Model {
+pub(crate) struct Model {
     /// Vertex positions; those that a face uses are finite as f32.
-    pub(super) positions: Vec<[f64; 3]>,
+    pub(crate) positions: Vec<[f64; 3]>,
     /// sRGB colours as written: empty, or one for each position.
-    pub(super) colors: Vec<[f32; 3]>,
+    pub(crate) colors: Vec<[f32; 3]>,
     /// (0, 0) at the lower left.
-    pub(super) uvs: Vec<[f32; 2]>,
+    pub(crate) uvs: Vec<[f32; 2]>,
     /// Unit length.
-    pub(super) normals: Vec<[f32; 3]>,
+    pub(crate) normals: Vec<[f32; 3]>,
     /// The corners of all faces, one face after the other.
-    pub(super) corners: Vec<Corner>,
+    pub(crate) corners: Vec<Corner>,
     /// Polygons with at least three corners.
-    pub(super) faces: Vec<Face>,
+    pub(crate) faces: Vec<Face>,
     /// What the faces belong to, in the order of first use.
-    pub(super) parts: Vec<Part>,
+    pub(crate) parts: Vec<Part>,
     /// The arguments of `mtllib`, with their lines.
-    pub(super) libraries: Vec<(u32, String)>,
+    pub(crate) libraries: Vec<(u32, String)>,
     /// The names that `usemtl` gives, in the order of first use, with their lines.
-    pub(super) materials: Vec<(u32, String)>,
+    pub(crate) materials: Vec<(u32, String)>,
     /// Whether there is any `s` statement.
-    pub(super) says_smoothing: bool,
+    pub(crate) says_smoothing: bool,
 }
 
 /// A corner of a face: indices, or [`NONE`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) struct Corner {
-    pub(super) position: u32,
-    pub(super) uv: u32,
-    pub(super) normal: u32,
+pub(crate) struct Corner {
+    pub(crate) position: u32,
+    pub(crate) uv: u32,
+    pub(crate) normal: u32,
 }
 
 /// A polygon.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Face {
+pub(crate) struct Face {
     /// First of its corners.
-    pub(super) start: u32,
+    pub(crate) start: u32,
     /// How many.
-    pub(super) len: u32,
-    pub(super) line: u32,
-    pub(super) part: u32,
+    pub(crate) len: u32,
+    pub(crate) line: u32,
+    pub(crate) part: u32,
     /// 0: flat.
-    pub(super) smoothing: u32,
+    pub(crate) smoothing: u32,
 }
 
 impl Face {
-    pub(super) fn range(self) -> std::ops::Range<usize> {
+    pub(crate) fn range(self) -> std::ops::Range<usize> {
         let start = self.start as usize;
         start..start + self.len as usize
     }
@@ -64,11 +64,11 @@ impl Face {
 
 /// Faces of one object and group with one material.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
-pub(super) struct Part {
-    pub(super) object: String,
-    pub(super) group: String,
+pub(crate) struct Part {
+    pub(crate) object: String,
+    pub(crate) group: String,
     /// Index into [`Model::materials`].
-    pub(super) material: Option<u32>,
+    pub(crate) material: Option<u32>,
 }
 
 /// How often something came up, and where first.

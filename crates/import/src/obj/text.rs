@@ -90,7 +90,7 @@ pub(super) fn words(text: &[u8]) -> impl Iterator<Item = &[u8]> {
 }
 
 /// A number, perhaps not a finite one. The C library of Windows writes those as `1.#INF` or `-1.#IND`.
-pub(super) fn number(word: &[u8]) -> Option<f64> {
+pub(crate) fn number(word: &[u8]) -> Option<f64> {
     match std::str::from_utf8(word).ok()?.parse() {
         Ok(x) => Some(x),
         Err(_) if word.windows(2).any(|w| w == b".#") => Some(f64::NAN),
