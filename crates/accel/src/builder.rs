@@ -72,6 +72,10 @@ impl SceneBuilder {
         self.instances.len() - 1
     }
 
+    pub(crate) fn into_parts(self) -> (BuildOptions, Vec<Vec<Geometry>>, Vec<(usize, DAffine3)>) {
+        (self.options, self.meshes, self.instances)
+    }
+
     /// Builds one tree for each mesh and one over the instances, on the threads of the rayon pool it is called from.
     ///
     /// # Errors

@@ -47,6 +47,7 @@ mod pages;
 mod query;
 pub mod reference;
 mod refit;
+mod saved;
 mod scene;
 #[allow(unsafe_code, reason = "the room for instructions of the processor")]
 mod simd;
@@ -64,6 +65,7 @@ pub use error::BuildError;
 pub use guards::Guards;
 pub use hit::{Hit, HitId, SurfacePoint, TraversalCounts};
 pub use query::{ClosestPoint, Crossings, HitLists};
+pub use saved::SavedTreesError;
 pub use scene::{Scene, SceneStats};
 pub use simd::Level;
 pub use solid::{SignMethod, Solid};

@@ -14,11 +14,13 @@ use crate::build::Topology;
 use crate::kernel::{Kernel, double};
 use crate::layout::Bvh2;
 use crate::layout::compact8::{self, Compact8};
+use crate::layout::wide8::Reference;
 use crate::layout::wide8::{self, Wide8};
 use crate::local::{Extent, LocalRay};
 use crate::normalise::common_scale;
 use crate::offer::{OfferTo, OfferTriangle};
 use crate::query::{Candidate, Closest, Collect, Collector, Dyn};
+use crate::saved::TreeShape;
 use crate::simd::{self, Available, Lanes, Work};
 use crate::stats::{DynProbe, Off, Probe};
 use crate::traverse::traverse;
@@ -121,18 +123,53 @@ impl Model {
         Self::make(mesh, geometries, options, Some(self))
     }
 
-    fn make(
+    /// Mesh number `mesh` in a tree of this shape, which has been checked; `None` where that does not fit.
+    pub(crate) fn new_in_shape(
         mesh: usize,
         geometries: &[Geometry],
         options: BuildOptions,
-        old: Option<&Self>,
-    ) -> Result<Self, BuildError> {
-        check(mesh, geometries)?;
-        let scale = common_scale(geometries, options.precision);
-        let normalised = |p: Vec3| (p.as_dvec3() / scale).as_vec3();
+        shape: TreeShape,
+    ) -> Result<Option<Self>, BuildError> {
+        let (tree, numbers) = match shape {
+            TreeShape::Wide { root, children, numbers, depth } => {
+                let tree = Wide8::of_shape(Reference(root), &children, numbers.len() / 4, depth);
+                (MeshTree::Wide { tree, level: Available::up_to(options.simd) }, numbers)
+            }
+            TreeShape::Binary { root, nodes, numbers, depth } => {
+                let topology = Topology { root, nodes, order: numbers.iter().map(|_| u32::MAX).collect() };
+                (MeshTree::Binary { tree: Bvh2::new(&topology, &[]), triangles: Vec::new(), depth }, numbers)
+            }
+        };
+        let shape = Self { numbers, ..Self::empty(tree, 1.0, options) };
+        let model = Self::make(mesh, geometries, options, Some(&shape))?;
+        // If it was built anew, there are other places.
+        let same = |a: &MeshTree, b: &MeshTree| match (a, b) {
+            (MeshTree::Wide { tree: a, .. }, MeshTree::Wide { tree: b, .. }) => a.root == b.root,
+            (MeshTree::Binary { tree: a, .. }, MeshTree::Binary { tree: b, .. }) => a.first() == b.first(),
+            _ => false,
+        };
+        Ok((same(&shape.tree, &model.tree) && shape.numbers == model.numbers).then_some(model))
+    }
 
-        let mut model = Self {
-            tree: MeshTree::Binary { tree: Bvh2::new(&Topology::default(), &[]), triangles: Vec::new(), depth: 0 },
+    /// What is below each node, and what is where. Not of compact trees.
+    pub(crate) fn shape(&self) -> Option<TreeShape> {
+        let numbers = self.numbers.clone();
+        match &self.tree {
+            MeshTree::Wide { tree, .. } => {
+                let children = tree.nodes.iter().map(|n| n.children).collect();
+                Some(TreeShape::Wide { root: tree.root.0, children, numbers, depth: tree.depth() })
+            }
+            MeshTree::Binary { tree, depth, .. } => {
+                let (root, nodes) = (tree.first(), tree.children_of_all());
+                Some(TreeShape::Binary { root, nodes, numbers, depth: *depth })
+            }
+            MeshTree::Compact { .. } => None,
+        }
+    }
+
+    fn empty(tree: MeshTree, scale: f64, options: BuildOptions) -> Self {
+        Self {
+            tree,
             numbers: Vec::new(),
             firsts: Vec::new(),
             places: Vec::new(),
@@ -143,7 +180,22 @@ impl Model {
             extent: Extent::default(),
             degenerate: 0,
             guards: options.guards,
-        };
+        }
+    }
+
+    fn make(
+        mesh: usize,
+        geometries: &[Geometry],
+        options: BuildOptions,
+        old: Option<&Self>,
+    ) -> Result<Self, BuildError> {
+        check(mesh, geometries)?;
+        let scale = common_scale(geometries, options.precision);
+        let normalised = |p: Vec3| (p.as_dvec3() / scale).as_vec3();
+
+        let nothing = Bvh2::new(&Topology::default(), &[]);
+        let mut model =
+            Self::empty(MeshTree::Binary { tree: nothing, triangles: Vec::new(), depth: 0 }, scale, options);
         // Everything in file order first.
         let mut triangles: Vec<[Vec3; 3]> = Vec::new();
         let mut boxes = Vec::new();

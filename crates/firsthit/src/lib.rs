@@ -3,6 +3,7 @@
 //! # Should I use this?
 //! Yes, if you want to
 //! * **ask a model for hits**: what does this ray meet first, is anything in the way, for one ray or millions;
+//! * **ask it for distances**: the nearest point of the surface, how far it is, whether a point is inside;
 //! * **be able to rely on the answers**: no leaks through closed meshes, at any scale and distance from the origin, the
 //!   same bits for any number of threads; every error bound is documented;
 //! * **turn an OBJ or glTF file into a picture** without setting anything up.
@@ -53,5 +54,7 @@ pub use firsthit_import as import;
 pub use firsthit_render as render;
 pub use glam;
 
-pub use firsthit_accel::{BuildOptions, Crossings, Geometry, Hit, HitId, Scene, SceneBuilder, SurfacePoint};
+pub use firsthit_accel::{
+    BuildOptions, ClosestPoint, Crossings, Geometry, Hit, HitId, Scene, SceneBuilder, SignMethod, Solid, SurfacePoint,
+};
 pub use firsthit_geometry::{Aabb, Precision, Ray, Shape};

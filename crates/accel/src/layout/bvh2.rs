@@ -34,6 +34,11 @@ impl<R: Real> Bvh2<R> {
         tree
     }
 
+    /// The children of all nodes.
+    pub(crate) fn children_of_all(&self) -> Vec<[Child; 2]> {
+        self.nodes.iter().map(|n| n.children).collect()
+    }
+
     /// A tree of the same shape over boxes in this order of the leaves; `u32::MAX` stands for a place with nothing.
     pub(crate) fn refit(&self, order: &[u32], boxes: &[Aabb<R>]) -> Self {
         let mut tree = self.clone();

@@ -69,7 +69,7 @@ impl Reference {
         (self.0 & (MOST_BLOCKS - 1)) as usize
     }
     /// Of a leaf: where its triangles are, `4 * block + lane`.
-    pub(super) fn places(self) -> Range<usize> {
+    pub(crate) fn places(self) -> Range<usize> {
         let first = self.block() * 4 + (self.0 >> 26 & 3) as usize;
         first..first + self.lanes().count_ones() as usize
     }
@@ -160,6 +160,13 @@ pub(super) fn leaf_cost(count: u32) -> f32 {
 }
 
 impl Wide8 {
+    /// A tree without boxes and triangles, to be refitted: so many blocks, and children of the nodes.
+    pub(crate) fn of_shape(root: Reference, children: &[[u32; 8]], blocks: usize, depth: u32) -> Self {
+        let nodes = children.iter().map(|&children| Node { children, ..Node::EMPTY }).collect();
+        // What a tree of one leaf costs; others are told by the refit.
+        Self { root, nodes, blocks: vec![Block::EMPTY; blocks], depth, sah_cost: 1.0 }
+    }
+
     /// A tree of the same shape over triangles in this order of the lanes; `u32::MAX` stands for a lane with nothing.
     pub(crate) fn refit(&self, order: &[u32], triangles: &[[Vec3; 3]], boxes: &[Aabb<f32>]) -> Self {
         let mut tree = self.clone();
