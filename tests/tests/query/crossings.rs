@@ -151,6 +151,10 @@ fn all_hits_are_those_of_brute_force() {
                 let ray = Ray::new(origin, place.transform_point3(target) - origin);
                 for what in [Crossings::Triangles, Crossings::Surfaces] {
                     let (hits, twin) = (scene.all_hits(&ray, what), reference::crossings(&scene, &ray, what));
+                    for count in [0, 1, 2, 9] {
+                        let first = &hits[..hits.len().min(count)];
+                        assert_eq!(scene.first_k_hits(&ray, count, what), first, "{precision} {what:?} {ray:?}");
+                    }
                     let least = |h: &Hit| h.u.min(h.v).min(1.0 - h.u - h.v);
                     let on_edge = twin.iter().chain(&hits).any(|h| least(h) < 1e-4);
                     if on_edge && precision != Precision::Double {
@@ -190,6 +194,7 @@ fn overlapping_faces_are_all_found_in_order() {
             let origin = rng.direction() * 2.0;
             let ray = Ray::new(origin, aim - origin);
             let hits = scene.all_hits(&ray, Crossings::Triangles);
+            assert_eq!(scene.first_k_hits(&ray, 3, Crossings::Triangles), hits[..hits.len().min(3)]);
             // At `Exact` the exact order comes before the id.
             let in_order = |a: &Hit, b: &Hit| a.t < b.t || a.t == b.t && (a.id < b.id || precision == Precision::Exact);
             assert!(hits.is_sorted_by(in_order), "{precision} {ray:?}");

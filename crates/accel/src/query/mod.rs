@@ -9,6 +9,7 @@ mod count_hits;
 mod crossings;
 mod decision;
 mod direct;
+mod first_hits;
 mod nearest_k;
 
 use core::ops::ControlFlow;

@@ -56,7 +56,7 @@ impl Seen {
 /// The depth of a tree of eight children a node.
 pub(super) fn check_wide(root: u32, children: &[[u32; 8]], numbers: &[u32]) -> Result<u32, SavedTreesError> {
     let mut seen = Seen::new(children.len(), numbers.len());
-    if numbers.len() % 4 != 0 {
+    if !numbers.len().is_multiple_of(4) {
         return Err(NO_TREE);
     }
     let blocks = numbers.len() / 4;
