@@ -157,6 +157,45 @@ impl Above {
     }
 }
 
+/// For those who walk through the tree themselves.
+impl Above {
+    /// The root, where that is a node.
+    pub(crate) fn first(&self) -> Option<u32> {
+        match &self.tree {
+            AboveTree::Binary(tree) => tree.first().filter(|root| !root.is_leaf()).map(|root| root.first),
+            AboveTree::Wide(wide) => (!wide.nodes.is_empty()).then_some(0),
+        }
+    }
+
+    /// The number of the box at a position of the leaves' runs.
+    pub(crate) fn numbered(&self, position: u32) -> u32 {
+        self.order[position as usize]
+    }
+
+    /// What is below a node, nodes or runs of positions, each with a box in the world around it.
+    pub(crate) fn below(&self, node: u32, f: &mut dyn FnMut(Result<u32, Range<u32>>, Aabb<f64>)) {
+        match &self.tree {
+            AboveTree::Binary(tree) => {
+                for (child, bounds) in tree.below(node) {
+                    let run = child.first..child.first + child.count;
+                    f(if child.is_leaf() { Err(run) } else { Ok(child.first) }, bounds);
+                }
+            }
+            AboveTree::Wide(wide) => {
+                let Frame { center, scale, .. } = wide.frame;
+                // What is rounded here is less than what is rounded outward in single precision, but for the center's part.
+                let room = DVec3::splat(2.0 * f64::EPSILON) * (center.abs() + scale);
+                wide.nodes[node as usize].each(|child, bounds| {
+                    let bounds = bounds.to_f64();
+                    let world = Aabb::new(bounds.min * scale + center - room, bounds.max * scale + center + room);
+                    let run = || wide.runs[(child.0 & !Reference::LEAF) as usize].clone();
+                    f(if child.is_leaf() { Err(run()) } else { Ok(child.0) }, world);
+                });
+            }
+        }
+    }
+}
+
 /// [`Above::nearest`] by the instructions of a level.
 struct Nearest<'a> {
     wide: &'a Wide,

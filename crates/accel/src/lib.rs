@@ -47,6 +47,7 @@ mod pages;
 mod query;
 pub mod reference;
 mod refit;
+mod region;
 mod saved;
 mod scene;
 #[allow(unsafe_code, reason = "the room for instructions of the processor")]
@@ -65,6 +66,7 @@ pub use error::BuildError;
 pub use guards::Guards;
 pub use hit::{Hit, HitId, SurfacePoint, TraversalCounts};
 pub use query::{ClosestPoint, Crossings, HitLists};
+pub use region::{VisitedTriangle, Visitor};
 pub use saved::SavedTreesError;
 pub use scene::{Scene, SceneStats};
 pub use simd::Level;

@@ -6,6 +6,7 @@
 use core::ops::ControlFlow;
 
 use firsthit_geometry::distance::closest_on_triangle;
+use firsthit_geometry::overlap::Region;
 use firsthit_geometry::{
     Primitive, Ray,
     exact::{ExactRay, Root},
@@ -14,6 +15,7 @@ use firsthit_geometry::{
 use glam::DVec3;
 
 use crate::model::Surface;
+use crate::region::meets;
 use crate::{ClosestPoint, Crossings, Hit, HitId, Scene};
 
 /// All hits in the ray's closed interval, by `t`, then by id, those of the closed triangles
@@ -160,6 +162,13 @@ pub fn nearest_k(scene: &Scene, point: DVec3, count: usize, radius: f64) -> Vec<
     all.into_iter().map(|(_, nearest)| nearest).take(count).collect()
 }
 
+/// The triangles that meet a region, by id.
+#[must_use]
+pub fn overlapping(scene: &Scene, region: &impl Region) -> Vec<HitId> {
+    let of = |(id, corners)| meets(region, corners).then_some(id);
+    if region.is_valid() { triangles(scene).filter_map(of).collect() } else { Vec::new() }
+}
+
 /// How often the triangles wind around a point: the sum of their solid angles as seen from there, over 4 pi.
 #[must_use]
 pub fn winding_number(scene: &Scene, point: DVec3) -> f64 {
@@ -182,6 +191,17 @@ fn placed(scene: &Scene, point: DVec3) -> impl Iterator<Item = (HitId, [DVec3; 3
             let Surface::Triangle(corners) = surface else { return None };
             let id = HitId { instance: i, geometry: id.geometry, primitive: id.primitive };
             Some((id, corners.map(|p| linear * p + offset)))
+        })
+    })
+}
+
+/// All triangles in the world.
+fn triangles(scene: &Scene) -> impl Iterator<Item = (HitId, [DVec3; 3])> {
+    scene.instances().iter().zip(0..).flat_map(move |(instance, i)| {
+        scene.models()[instance.model as usize].surfaces().filter_map(move |(id, surface)| {
+            let Surface::Triangle(corners) = surface else { return None };
+            let id = HitId { instance: i, geometry: id.geometry, primitive: id.primitive };
+            Some((id, corners.map(|p| instance.transform.point(p))))
         })
     })
 }

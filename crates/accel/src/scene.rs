@@ -253,6 +253,11 @@ impl Inner {
         self.bounded[k as usize]
     }
 
+    /// How many instances the tree above has.
+    pub(crate) fn bounded_count(&self) -> u32 {
+        self.bounded.len() as u32
+    }
+
     /// Offers hits to the collector, by the tests of the scene's tier.
     fn trace<const SURFACES: bool, C: Collector, P: Probe>(
         &self,

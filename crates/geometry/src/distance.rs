@@ -1,4 +1,6 @@
-//! Closest points: on a segment, a box, a triangle.
+//! Closest points: on a segment, a box, a triangle, and between two of these.
+
+use glam::DVec3;
 
 use crate::{Aabb, Real, Vector3};
 
@@ -128,6 +130,94 @@ fn precedes<R: Real>(a: R::Vec3, b: R::Vec3) -> bool {
 fn squared_distance<R: Real>(a: R::Vec3, b: R::Vec3) -> R {
     let d = a - b;
     d.dot(d)
+}
+
+/// Two points, one of each of two bodies: those that are nearest to each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ClosestPair {
+    /// Of the first body.
+    pub first: DVec3,
+    /// Of the second.
+    pub second: DVec3,
+}
+
+impl ClosestPair {
+    /// How far they are from each other.
+    #[must_use]
+    pub fn distance(&self) -> f64 {
+        self.first.distance(self.second)
+    }
+
+    fn swapped(self) -> Self {
+        Self { first: self.second, second: self.first }
+    }
+
+    fn nearer(self, other: Self) -> Self {
+        let squared = |p: &Self| (p.first - p.second).length_squared();
+        if squared(&other) < squared(&self) { other } else { self }
+    }
+}
+
+/// The points of two segments that are nearest to each other; of parallel ones, some of these. Ends may coincide.
+///
+/// Error: some `u` times the largest distance between the points, divided by the sine of the angle.
+#[must_use]
+pub fn closest_between_segments(first: [DVec3; 2], second: [DVec3; 2]) -> ClosestPair {
+    let ([a, b], [c, d]) = (first, second);
+    let on = |ends: [DVec3; 2], p: DVec3| closest_on_segment::<f64>(ends[0], ends[1], p).point;
+    // Where an end is nearest; right also for segments that are parallel.
+    let of_first = |p: DVec3| ClosestPair { first: p, second: on(second, p) };
+    let of_second = |p: DVec3| ClosestPair { first: on(first, p), second: p };
+    let ends = of_first(a).nearer(of_first(b)).nearer(of_second(c)).nearer(of_second(d));
+    // Or both inside.
+    let (u, v, w) = (b - a, d - c, a - c);
+    let (uu, uv, vv, uw, vw) = (u.dot(u), u.dot(v), v.dot(v), u.dot(w), v.dot(w));
+    let sine = uu * vv - uv * uv;
+    let (s, t) = ((uv * vw - vv * uw) / sine, (uu * vw - uv * uw) / sine);
+    if (0.0..=1.0).contains(&s) && (0.0..=1.0).contains(&t) {
+        // The nearest to a point that may be rounded is the better of the two.
+        let p = of_first(a + u * s);
+        ends.nearer(ClosestPair { first: on(first, p.second), second: p.second })
+    } else {
+        ends
+    }
+}
+
+/// The points of a segment and a triangle that are nearest to each other: the same one where they meet.
+#[must_use]
+pub fn segment_to_triangle(segment: [DVec3; 2], triangle: [DVec3; 3]) -> ClosestPair {
+    let [p, q] = segment;
+    let [a, b, c] = triangle;
+    let of_end = |p: DVec3| ClosestPair { first: p, second: closest_on_triangle::<f64>(triangle, p).point };
+    let mut best = of_end(p).nearer(of_end(q));
+    for edge in [[a, b], [b, c], [c, a]] {
+        best = best.nearer(closest_between_segments(segment, edge));
+    }
+    // Through the face.
+    let n = (b - a).cross(c - a);
+    let (hp, hq) = (n.dot(p - a), n.dot(q - a));
+    if (hp < 0.0) != (hq < 0.0) {
+        best = best.nearer(of_end(p.lerp(q, hp / (hp - hq))));
+    }
+    best
+}
+
+/// The points of two triangles that are nearest to each other; where they meet, one point twice, but for rounding.
+///
+/// ```
+/// use firsthit_geometry::distance::closest_between_triangles;
+/// use glam::DVec3;
+/// let floor = [DVec3::ZERO, DVec3::X * 4.0, DVec3::Y * 4.0];
+/// let above = [DVec3::new(1.0, 1.0, 2.0), DVec3::new(1.0, 1.0, 5.0), DVec3::new(1.0, 2.0, 5.0)];
+/// assert_eq!(closest_between_triangles(floor, above).distance(), 2.0);
+/// ```
+#[must_use]
+pub fn closest_between_triangles(first: [DVec3; 3], second: [DVec3; 3]) -> ClosestPair {
+    let edges = |[a, b, c]: [DVec3; 3]| [[a, b], [b, c], [c, a]];
+    let of_first = edges(first).map(|e| segment_to_triangle(e, second));
+    let of_second = edges(second).map(|e| segment_to_triangle(e, first).swapped());
+    let start = of_first[0];
+    of_first.into_iter().skip(1).chain(of_second).fold(start, ClosestPair::nearer)
 }
 
 #[cfg(test)]

@@ -21,6 +21,7 @@ pub mod exact;
 pub mod frustum;
 pub mod mesh;
 pub mod offset;
+pub mod overlap;
 mod precision;
 pub mod quadratic;
 mod ray;

@@ -10,6 +10,7 @@ mod leaks;
 mod nearest;
 mod packets;
 mod rays;
+mod region;
 mod saved;
 mod shapes;
 mod single;

@@ -4,7 +4,8 @@
 //! the wide tree meets. The triangles of a leaf share a table of their vertices, in single precision as ever: the tests
 //! see the same numbers, and answers are the same bits.
 
-use glam::Vec3;
+use firsthit_geometry::Aabb;
+use glam::{DVec3, Vec3};
 
 use super::wide8::{self, Reference, Wide8};
 use crate::simd::{Lanes, Row};
@@ -84,6 +85,19 @@ impl Node {
             }
         }
         node
+    }
+
+    /// Tells of the children that are there, with their boxes: those of the grid, with room for what was rounded on it.
+    pub(crate) fn each(&self, mut f: impl FnMut(Reference, Aabb<f64>)) {
+        let vector = |v: [f32; 3]| Vec3::from(v).as_dvec3();
+        let (origin, step) = (vector(self.origin), vector(self.steps));
+        for k in (0..8).filter(|k| self.there >> k & 1 == 1) {
+            let [lx, hx, ly, hy, lz, hz] = self.planes.map(|p| f64::from(p[k]));
+            let room = DVec3::splat(2f64.powi(-40));
+            let low = origin + (DVec3::new(lx, ly, lz) - room) * step;
+            let high = origin + (DVec3::new(hx, hy, hz) + room) * step;
+            f(Reference(self.children[k]), Aabb::new(low, high));
+        }
     }
 }
 

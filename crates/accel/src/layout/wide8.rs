@@ -110,11 +110,23 @@ impl Node {
         axis * 2 + side
     }
 
+    fn child_box(&self, k: usize) -> Aabb<f32> {
+        let p = &self.planes;
+        Aabb::new(Vec3::new(p[0][k], p[2][k], p[4][k]), Vec3::new(p[1][k], p[3][k], p[5][k]))
+    }
+
     /// Around all children; those that are missing are empty.
     fn bounds(&self) -> Aabb<f32> {
-        let p = &self.planes;
-        let child = |k: usize| Aabb::new(Vec3::new(p[0][k], p[2][k], p[4][k]), Vec3::new(p[1][k], p[3][k], p[5][k]));
-        (0..8).fold(Aabb::empty(), |all, k| all.union(child(k)))
+        (0..8).fold(Aabb::empty(), |all, k| all.union(self.child_box(k)))
+    }
+
+    /// Tells of the children that are there, with their boxes.
+    pub(crate) fn each(&self, mut f: impl FnMut(Reference, Aabb<f32>)) {
+        for (k, child) in self.children.map(Reference).into_iter().enumerate() {
+            if child != Reference::NOTHING {
+                f(child, self.child_box(k));
+            }
+        }
     }
 
     /// Writes one child's box.
