@@ -2,6 +2,7 @@
 
 mod basisu;
 mod draco;
+mod environment;
 mod instancing;
 mod meshopt;
 mod ply_stl;

@@ -21,7 +21,7 @@ const fn entry(name: &'static str, support: Support, note: &'static str) -> Exte
     Extension { name, support, note }
 }
 
-use Support::{Full, Ignored, Unsupported};
+use Support::{Full, Ignored, Partial, Unsupported};
 
 const BASISU: Extension = if cfg!(feature = "ktx2") {
     entry("KHR_texture_basisu", Full, "")
@@ -34,7 +34,11 @@ pub const EXTENSIONS: &[Extension] = &[
     entry("AGI_articulations", Ignored, "the rest pose is shown"),
     entry("CESIUM_primitive_outline", Ignored, "outlines are not drawn"),
     entry("EXT_lights_ies", Unsupported, "these lights are left out"),
-    entry("EXT_lights_image_based", Unsupported, "the environment is chosen by the renderer"),
+    entry(
+        "EXT_lights_image_based",
+        Partial,
+        "the finest images surround the scene; blurred ones and irradiance are not read: their light is traced",
+    ),
     entry("EXT_mesh_features", Ignored, "identifiers without effect on the picture"),
     entry("EXT_mesh_gpu_instancing", Full, "instances share their mesh; skins are drawn once"),
     entry("EXT_mesh_manifold", Ignored, "the triangles are the same"),

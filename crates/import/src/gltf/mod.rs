@@ -23,6 +23,7 @@ mod attribute;
 mod bake;
 mod camera_light;
 mod draco;
+mod environment;
 mod extensions;
 mod glb;
 mod instance;
@@ -107,6 +108,11 @@ pub(crate) fn read_bytes(bytes: &[u8], path: &Path, options: &Options) -> Result
         scene.lights.extend(camera_light::light(&source, node, world, &mut report)?);
     }
     scene.images = textures.decode(&mut report);
+    let shown = root.scene.map(|s| s.value()).or((!root.scenes.is_empty()).then_some(0));
+    if let Some((around, image)) = environment::read(&source, shown, scene.images.len(), &mut report)? {
+        scene.environment = Some(around);
+        scene.images.push(image);
+    }
     Ok(Imported { scene, report })
 }
 

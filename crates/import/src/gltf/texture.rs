@@ -119,7 +119,7 @@ impl<'a> Textures<'a> {
         let mut left = *self.source.limits;
         for (k, &shown) in self.used.iter().enumerate().filter(|(k, _)| self.wanted[*k]) {
             let bytes = match shown {
-                Shown::Image(index) => self.bytes(index, &left, report),
+                Shown::Image(index) => image_bytes(self.source, index, &left, report),
                 Shown::Nothing { texture } => {
                     Err(self.source.invalid(format!("/textures/{texture}"), "has no image that can be read"))
                 }
@@ -151,22 +151,31 @@ impl<'a> Textures<'a> {
         images
     }
 
-    fn bytes(&self, index: usize, limits: &Limits, report: &mut Report) -> Result<Cow<'a, [u8]>, ImportError> {
-        let image = &self.source.root.images[index];
-        let place = format!("/images/{index}");
-        match (&image.uri, image.buffer_view) {
-            (Some(uri), _) => self.source.resource(uri, &(place + "/uri"), limits, report).map(Cow::Owned),
-            (None, Some(view)) => self.source.view(view).map(Cow::Borrowed),
-            (None, None) => Err(self.source.invalid(place, "has neither a URI nor a buffer view")),
-        }
-    }
-
     /// The image's name, else its file's, else its number.
     fn name(&self, shown: Shown) -> String {
         let Shown::Image(index) = shown else { return "no image".into() };
         let image = &self.source.root.images[index];
         let file = image.uri.as_ref().filter(|u| !u.starts_with("data:"));
         image.name.clone().or_else(|| file.cloned()).unwrap_or_else(|| format!("image {index}"))
+    }
+}
+
+/// The encoded bytes of an image.
+///
+/// # Errors
+/// If they cannot be read.
+pub(super) fn image_bytes<'a>(
+    source: &'a Source<'_>,
+    index: usize,
+    limits: &Limits,
+    report: &mut Report,
+) -> Result<Cow<'a, [u8]>, ImportError> {
+    let image = &source.root.images[index];
+    let place = format!("/images/{index}");
+    match (&image.uri, image.buffer_view) {
+        (Some(uri), _) => source.resource(uri, &(place + "/uri"), limits, report).map(Cow::Owned),
+        (None, Some(view)) => source.view(view).map(Cow::Borrowed),
+        (None, None) => Err(source.invalid(place, "has neither a URI nor a buffer view")),
     }
 }
 
