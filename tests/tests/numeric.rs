@@ -209,11 +209,21 @@ proptest! {
 /// `docs/from-the-lecture.md` names files and tests that exist.
 #[test]
 fn the_lecture_table_is_true() {
+    names_what_exists("docs/from-the-lecture.md", 20);
+}
+
+/// `docs/queries.md` too.
+#[test]
+fn the_table_of_queries_is_true() {
+    names_what_exists("docs/queries.md", 3);
+}
+
+fn names_what_exists(document: &str, least: usize) {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let text = std::fs::read_to_string(root.join("docs/from-the-lecture.md")).expect("the document");
+    let text = std::fs::read_to_string(root.join(document)).expect("the document");
 
     let links: Vec<&str> = text.split("](").skip(1).filter_map(|s| s.split(')').next()).collect();
-    assert!(links.len() > 20, "the document has its table");
+    assert!(links.len() > least, "the document has its table");
     let broken: Vec<_> = links.iter().filter(|l| !root.join("docs").join(l).exists()).collect();
     assert!(broken.is_empty(), "broken links: {broken:?}");
 
