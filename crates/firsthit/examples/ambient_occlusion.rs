@@ -10,10 +10,12 @@ use firsthit::glam::DVec3;
 use firsthit::import::scene::SurfaceDesc;
 use firsthit::{BuildOptions, Ray, SceneBuilder};
 
+type Result<T> = std::result::Result<T, Box<dyn Error>>;
+
 const RAYS: u32 = 128;
 
 /// How much of the sky each vertex of the model's first mesh sees, 0 to 1, and the mesh as OBJ with these as colours.
-pub(crate) fn run(model: &str) -> Result<(Vec<f64>, String), Box<dyn Error>> {
+pub(crate) fn run(model: &str) -> Result<(Vec<f64>, String)> {
     let imported = firsthit::import::open(model, &Default::default())?;
     let scene = SceneBuilder::from_desc(&imported.scene, BuildOptions::default()).build()?;
     let instance = imported.scene.instances.first().ok_or("there is nothing in the model")?;
@@ -53,7 +55,7 @@ pub(crate) fn run(model: &str) -> Result<(Vec<f64>, String), Box<dyn Error>> {
 }
 
 #[allow(dead_code, reason = "the tests call `run`")]
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> Result<()> {
     let mut arguments = std::env::args().skip(1);
     let model = arguments.next().unwrap_or_else(|| "assets/spot/spot.obj".into());
     let file = arguments.next().unwrap_or_else(|| "baked.obj".into());

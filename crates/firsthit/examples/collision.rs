@@ -8,13 +8,11 @@ use std::error::Error;
 use firsthit::glam::DVec3;
 use firsthit::{BuildOptions, ClosestPoint, SceneBuilder};
 
+type Result<T> = std::result::Result<T, Box<dyn Error>>;
+
 /// Where the middle of a ball comes to rest that falls from above the middle of the model's box, shifted by a part of its size;
 /// and what it touches there. `None` if it falls past the model.
-pub(crate) fn run(
-    model: &str,
-    shift: [f64; 2],
-    radius: f64,
-) -> Result<Option<(DVec3, ClosestPoint, u32)>, Box<dyn Error>> {
+pub(crate) fn run(model: &str, shift: [f64; 2], radius: f64) -> Result<Option<(DVec3, ClosestPoint, u32)>> {
     let imported = firsthit::import::open(model, &Default::default())?;
     let scene = SceneBuilder::from_desc(&imported.scene, BuildOptions::default()).build()?;
     let (bounds, size) = (scene.bounds(), scene.bounds().extent());
@@ -34,7 +32,7 @@ pub(crate) fn run(
 }
 
 #[allow(dead_code, reason = "the tests call `run`")]
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> Result<()> {
     let model = std::env::args().nth(1).unwrap_or_else(|| "assets/spot/spot.obj".into());
     for shift in [[0.0, 0.0], [0.1, -0.3], [0.0, 0.4], [0.45, 0.45]] {
         match run(&model, shift, 0.05)? {

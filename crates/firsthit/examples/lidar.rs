@@ -6,13 +6,18 @@ use std::fmt::Write;
 use firsthit::glam::DVec3;
 use firsthit::{BuildOptions, Hit, Ray, SceneBuilder};
 
+type Result<T> = std::result::Result<T, Box<dyn Error>>;
+
 /// Beams one above the other, from -45 to 45 degrees.
 pub(crate) const BEAMS: u32 = 128;
 /// Directions of one turn.
 pub(crate) const TURN: u32 = 720;
 
-/// The rays, beam by beam, and what they hit.
-pub(crate) fn run(model: &str) -> Result<(Vec<Ray<f64>>, Vec<Option<Hit>>), Box<dyn Error>> {
+/// The rays, beam by beam.
+type Rays = Vec<Ray<f64>>;
+
+/// The rays and what they hit.
+pub(crate) fn run(model: &str) -> Result<(Rays, Vec<Option<Hit>>)> {
     let imported = firsthit::import::open(model, &Default::default())?;
     let scene = SceneBuilder::from_desc(&imported.scene, BuildOptions::default()).build()?;
     let origin = scene.bounds().center();
@@ -28,7 +33,7 @@ pub(crate) fn run(model: &str) -> Result<(Vec<Ray<f64>>, Vec<Option<Hit>>), Box<
 }
 
 #[allow(dead_code, reason = "the tests call `run`")]
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> Result<()> {
     let mut arguments = std::env::args().skip(1);
     let model = arguments.next().unwrap_or_else(|| "assets/cornell-box/CornellBox-Original.obj".into());
     let cloud = arguments.next().unwrap_or_else(|| "cloud.xyz".into());

@@ -7,8 +7,10 @@ use std::error::Error;
 use firsthit::glam::DVec3;
 use firsthit::{BuildOptions, Ray, SceneBuilder};
 
+type Result<T> = std::result::Result<T, Box<dyn Error>>;
+
 /// For each post, which others it sees.
-pub(crate) fn run(model: &str, posts: u32) -> Result<Vec<Vec<bool>>, Box<dyn Error>> {
+pub(crate) fn run(model: &str, posts: u32) -> Result<Vec<Vec<bool>>> {
     let imported = firsthit::import::open(model, &Default::default())?;
     let scene = SceneBuilder::from_desc(&imported.scene, BuildOptions::default()).build()?;
     let (center, radius) = (scene.bounds().center(), scene.bounds().extent().length() * 0.6);
@@ -24,7 +26,7 @@ pub(crate) fn run(model: &str, posts: u32) -> Result<Vec<Vec<bool>>, Box<dyn Err
 }
 
 #[allow(dead_code, reason = "the tests call `run`")]
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> Result<()> {
     let model = std::env::args().nth(1).unwrap_or_else(|| "assets/spot/spot.obj".into());
     for row in run(&model, 24)? {
         println!("{}", row.iter().map(|sees| if *sees { " x" } else { " ." }).collect::<String>());

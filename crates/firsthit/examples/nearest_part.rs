@@ -5,8 +5,10 @@ use std::error::Error;
 use firsthit::glam::DVec3;
 use firsthit::{BuildOptions, SceneBuilder};
 
+type Result<T> = std::result::Result<T, Box<dyn Error>>;
+
 /// The parts with triangles among the nearest hundred, the nearest first: name, distance, nearest point.
-pub(crate) fn run(model: &str, point: DVec3) -> Result<Vec<(String, f64, DVec3)>, Box<dyn Error>> {
+pub(crate) fn run(model: &str, point: DVec3) -> Result<Vec<(String, f64, DVec3)>> {
     let desc = firsthit::import::open(model, &Default::default())?.scene;
     let scene = SceneBuilder::from_desc(&desc, BuildOptions::default()).build()?;
     let mut parts: Vec<(String, f64, DVec3)> = Vec::new();
@@ -22,7 +24,7 @@ pub(crate) fn run(model: &str, point: DVec3) -> Result<Vec<(String, f64, DVec3)>
 }
 
 #[allow(dead_code, reason = "the tests call `run`")]
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> Result<()> {
     let mut arguments = std::env::args().skip(1);
     let model = arguments.next().unwrap_or_else(|| "assets/cornell-box/CornellBox-Original.obj".into());
     let mut number = |or: f64| arguments.next().map_or(Ok(or), |x| x.parse());

@@ -8,8 +8,10 @@ use std::sync::Arc;
 use firsthit::render::{Stage, StageOptions};
 use firsthit::{BuildOptions, Hit, SceneBuilder};
 
+type Result<T> = std::result::Result<T, Box<dyn Error>>;
+
 /// What is at a pixel, with the names of the object and its part.
-pub(crate) fn run(model: &str, pixel: [f64; 2]) -> Result<Option<(Hit, String, String)>, Box<dyn Error>> {
+pub(crate) fn run(model: &str, pixel: [f64; 2]) -> Result<Option<(Hit, String, String)>> {
     let desc = Arc::new(firsthit::import::open(model, &Default::default())?.scene);
     let scene = SceneBuilder::from_desc(&desc, BuildOptions::default()).build()?;
     let stage = Stage::new(desc.clone(), scene.clone(), &StageOptions::default())?;
@@ -22,7 +24,7 @@ pub(crate) fn run(model: &str, pixel: [f64; 2]) -> Result<Option<(Hit, String, S
 }
 
 #[allow(dead_code, reason = "the tests call `run`")]
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> Result<()> {
     let mut arguments = std::env::args().skip(1);
     let model = arguments.next().unwrap_or_else(|| "assets/spot/spot.obj".into());
     let mut number = |or: f64| arguments.next().map_or(Ok(or), |x| x.parse());

@@ -8,8 +8,10 @@ use std::error::Error;
 use firsthit::glam::DVec3;
 use firsthit::{BuildOptions, Crossings, Ray, SceneBuilder};
 
+type Result<T> = std::result::Result<T, Box<dyn Error>>;
+
 /// Spans of material along x in each of `rows` rows of the layer at a part of the height, and their area in world units.
-pub(crate) fn run(model: &str, height: f64, rows: u32) -> Result<(Vec<Vec<[f64; 2]>>, f64), Box<dyn Error>> {
+pub(crate) fn run(model: &str, height: f64, rows: u32) -> Result<(Vec<Vec<[f64; 2]>>, f64)> {
     let imported = firsthit::import::open(model, &Default::default())?;
     let scene = SceneBuilder::from_desc(&imported.scene, BuildOptions::default()).build()?;
     let (low, size) = (scene.bounds().min, scene.bounds().extent());
@@ -28,7 +30,7 @@ pub(crate) fn run(model: &str, height: f64, rows: u32) -> Result<(Vec<Vec<[f64; 
 }
 
 #[allow(dead_code, reason = "the tests call `run`")]
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> Result<()> {
     let mut arguments = std::env::args().skip(1);
     let model = arguments.next().unwrap_or_else(|| "assets/spot/spot.obj".into());
     let height: f64 = arguments.next().map_or(Ok(0.5), |x| x.parse())?;

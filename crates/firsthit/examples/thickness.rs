@@ -7,8 +7,10 @@ use std::error::Error;
 use firsthit::import::scene::SurfaceDesc;
 use firsthit::{BuildOptions, Ray, SceneBuilder};
 
+type Result<T> = std::result::Result<T, Box<dyn Error>>;
+
 /// Thickness below the middle of each triangle, in world units; infinite where there is no other side.
-pub(crate) fn run(model: &str) -> Result<Vec<f64>, Box<dyn Error>> {
+pub(crate) fn run(model: &str) -> Result<Vec<f64>> {
     let imported = firsthit::import::open(model, &Default::default())?;
     let scene = SceneBuilder::from_desc(&imported.scene, BuildOptions::default()).build()?;
     let mut walls = Vec::new();
@@ -30,7 +32,7 @@ pub(crate) fn run(model: &str) -> Result<Vec<f64>, Box<dyn Error>> {
 }
 
 #[allow(dead_code, reason = "the tests call `run`")]
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> Result<()> {
     let model = std::env::args().nth(1).unwrap_or_else(|| "assets/spot/spot.obj".into());
     let mut walls = run(&model)?;
     walls.sort_by(f64::total_cmp);

@@ -9,8 +9,10 @@ use std::sync::Arc;
 use firsthit::render::{Stage, StageOptions};
 use firsthit::{BuildOptions, Ray, SceneBuilder};
 
+type Result<T> = std::result::Result<T, Box<dyn Error>>;
+
 /// Name of each part that is seen, and how many pixels show it; and the number of pixels.
-pub(crate) fn run(model: &str, width: u32, height: u32) -> Result<(BTreeMap<String, u32>, u32), Box<dyn Error>> {
+pub(crate) fn run(model: &str, width: u32, height: u32) -> Result<(BTreeMap<String, u32>, u32)> {
     let desc = Arc::new(firsthit::import::open(model, &Default::default())?.scene);
     let scene = SceneBuilder::from_desc(&desc, BuildOptions::default()).build()?;
     let stage = Stage::new(desc.clone(), scene.clone(), &StageOptions::default())?;
@@ -29,7 +31,7 @@ pub(crate) fn run(model: &str, width: u32, height: u32) -> Result<(BTreeMap<Stri
 }
 
 #[allow(dead_code, reason = "the tests call `run`")]
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> Result<()> {
     let model = std::env::args().nth(1).unwrap_or_else(|| "assets/flight-helmet/FlightHelmet.gltf".into());
     let (seen, pixels) = run(&model, 640, 360)?;
     let mut seen: Vec<_> = seen.into_iter().collect();

@@ -7,8 +7,10 @@ use std::error::Error;
 use firsthit::glam::DVec3;
 use firsthit::{BuildOptions, SceneBuilder, Solid};
 
+type Result<T> = std::result::Result<T, Box<dyn Error>>;
+
 /// Signed distances at the middles of `n`^3 cells of the model's box, x fastest; and the volume of a cell.
-pub(crate) fn run(model: &str, n: u32) -> Result<(Vec<f64>, f64), Box<dyn Error>> {
+pub(crate) fn run(model: &str, n: u32) -> Result<(Vec<f64>, f64)> {
     let imported = firsthit::import::open(model, &Default::default())?;
     let scene = SceneBuilder::from_desc(&imported.scene, BuildOptions::default()).build()?;
     let solid = Solid::new(&scene);
@@ -21,7 +23,7 @@ pub(crate) fn run(model: &str, n: u32) -> Result<(Vec<f64>, f64), Box<dyn Error>
 }
 
 #[allow(dead_code, reason = "the tests call `run`")]
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> Result<()> {
     let mut arguments = std::env::args().skip(1);
     let model = arguments.next().unwrap_or_else(|| "assets/spot/spot.obj".into());
     let picture = arguments.next().unwrap_or_else(|| "slice.png".into());
