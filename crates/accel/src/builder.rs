@@ -39,21 +39,10 @@ impl SceneBuilder {
     #[cfg(feature = "import")]
     #[must_use]
     pub fn from_desc(desc: &firsthit_import::SceneDesc, options: BuildOptions) -> Self {
-        use firsthit_import::scene::SurfaceDesc;
         let mut builder = Self::new(options);
-        for mesh in &desc.meshes {
-            builder.add_mesh(
-                mesh.geometries
-                    .iter()
-                    .map(|g| match &g.surface {
-                        SurfaceDesc::Triangles(m) => {
-                            Geometry::Triangles { positions: m.positions.clone(), triangles: m.triangles.clone() }
-                        }
-                        SurfaceDesc::Shape(s) => Geometry::Shape(s.clone()),
-                    })
-                    .collect(),
-            );
-        }
+        desc.meshes.iter().for_each(|mesh| {
+            builder.add_mesh(geometries(mesh));
+        });
         for i in &desc.instances {
             builder.add_instance(i.mesh, i.transform);
         }
@@ -83,4 +72,17 @@ impl SceneBuilder {
     pub fn build(self) -> Result<Scene, BuildError> {
         Scene::new(self.options, &self.meshes, self.instances)
     }
+}
+
+/// The parts of a mesh of a file.
+#[cfg(feature = "import")]
+pub(crate) fn geometries(mesh: &firsthit_import::scene::MeshDesc) -> Vec<Geometry> {
+    use firsthit_import::scene::SurfaceDesc;
+    let part = |surface: &SurfaceDesc| match surface {
+        SurfaceDesc::Triangles(m) => {
+            Geometry::Triangles { positions: m.positions.clone(), triangles: m.triangles.clone() }
+        }
+        SurfaceDesc::Shape(s) => Geometry::Shape(s.clone()),
+    };
+    mesh.geometries.iter().map(|g| part(&g.surface)).collect()
 }

@@ -30,6 +30,8 @@ mod build;
 mod build_options;
 mod builder;
 mod error;
+#[cfg(feature = "import")]
+mod follow;
 mod guards;
 mod hit;
 mod instance;
@@ -63,6 +65,8 @@ mod wide;
 pub use build_options::{BuildOptions, BuildQuality, Layout};
 pub use builder::{Geometry, SceneBuilder};
 pub use error::BuildError;
+#[cfg(feature = "import")]
+pub use follow::Followed;
 pub use guards::Guards;
 pub use hit::{Hit, HitId, SurfacePoint, TraversalCounts};
 pub use query::{ClosestPoint, Crossings, HitLists};

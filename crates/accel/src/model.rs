@@ -48,6 +48,8 @@ pub(crate) struct Model {
     extent: Extent,
     degenerate: u64,
     pub(crate) guards: Guards,
+    /// The cost of the tree when it was built: refits keep it.
+    built_cost: f64,
 }
 
 /// The tree with its triangles, which lie in the order of the leaves, divided by the model's scale.
@@ -180,6 +182,7 @@ impl Model {
             extent: Extent::default(),
             degenerate: 0,
             guards: options.guards,
+            built_cost: 0.0,
         }
     }
 
@@ -261,8 +264,10 @@ impl Model {
         let number = |&i: &u32| numbers.get(i as usize).copied().unwrap_or(u32::MAX);
         // A place that is left empty has no number, so that whatever lies there is never hit.
         let reused = old.and_then(|old| Some((&old.tree, old.order_of(&numbers)?)));
+        let mut was_refitted = false;
         match (layout, reused) {
             (Layout::Bvh2, Some((MeshTree::Binary { tree, depth, .. }, order))) => {
+                was_refitted = true;
                 let triangle = |&i: &u32| triangles.get(i as usize).copied().unwrap_or_default();
                 model.numbers = order.iter().map(number).collect();
                 model.tree = MeshTree::Binary {
@@ -272,6 +277,7 @@ impl Model {
                 };
             }
             (Layout::Wide8, Some((MeshTree::Wide { tree, level }, order))) => {
+                was_refitted = true;
                 model.numbers = order.iter().map(number).collect();
                 model.tree = MeshTree::Wide { tree: tree.refit(&order, &triangles, &boxes), level: *level };
             }
@@ -306,6 +312,9 @@ impl Model {
             let id = model.id(place);
             model.remember(place, id);
         }
+        // A shape that was loaded has no cost until it is filled.
+        let before = old.map_or(0.0, |old| old.built_cost);
+        model.built_cost = if was_refitted && before > 0.0 { before } else { model.sah_cost() };
         Ok(model)
     }
 
@@ -374,6 +383,11 @@ impl Model {
             MeshTree::Wide { tree, .. } => tree.sah_cost(),
             MeshTree::Compact { tree, .. } => tree.sah_cost(),
         }
+    }
+    /// How many times what it cost when it was built the tree costs.
+    #[cfg_attr(not(feature = "import"), allow(dead_code, reason = "asked where frames follow each other"))]
+    pub(crate) fn growth(&self) -> f64 {
+        if self.built_cost > 0.0 { self.sah_cost() / self.built_cost } else { 1.0 }
     }
     pub(crate) fn degenerate(&self) -> u64 {
         self.degenerate

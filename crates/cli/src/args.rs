@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
 use firsthit_geometry::Precision;
-use firsthit_import::UpAxis;
+use firsthit_import::{AnimationChoice, Play, UpAxis};
 use firsthit_render::sampler::SamplerChoice;
 use firsthit_render::{
     CameraChoice, Crop, EffectOverrides, FilterChoice, IntegratorChoice, TextureFilter, ViewTransform,
@@ -47,6 +47,10 @@ Examples:
       What the scene calls for, without shadows and with ambient occlusion.
   firsthit render car.glb -o - | display -
       PNG on standard output.
+  firsthit render fox.glb --animation Run --animation-time 0.4s
+      A moment of an animation.
+  firsthit render fox.glb --animation Run --frames 0..48 --fps 24 -s 64 -o run_%04d.png
+      Two seconds of it, one file for each frame.
 
 A `firsthit.toml` in the current folder (or the file of --config) may set any long option by its name, for example
   resolution = \"1920x1080\"
@@ -120,6 +124,8 @@ pub(crate) struct RenderArgs {
     pub(crate) camera: CameraArgs,
     #[command(flatten)]
     pub(crate) scene: SceneArgs,
+    #[command(flatten)]
+    pub(crate) animation: AnimationArgs,
     #[command(flatten)]
     pub(crate) run: RunArgs,
 }
@@ -293,6 +299,18 @@ pub(crate) struct SceneArgs {
     #[arg(long, value_name = "NAME|INDEX")]
     pub(crate) variant: Option<String>,
 
+    /// A scene of the file, by name or by number from 0 (glTF; `inspect` lists them) [default: the file's]
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub(crate) scene: Option<String>,
+
+    /// Draw points (glTF's) as balls of this radius, in units of their mesh
+    #[arg(long, value_name = "RADIUS", value_parser = values::positive)]
+    pub(crate) points: Option<f64>,
+
+    /// Draw lines (glTF's) as rods of this radius, in units of their mesh
+    #[arg(long, value_name = "RADIUS", value_parser = values::positive)]
+    pub(crate) lines: Option<f64>,
+
     /// Light from around: an image by longitude and latitude (.hdr, .exr), or studio, white, black
     /// [default: the scene's, else the studio where there is no light]
     #[arg(long, value_name = "FILE|studio|white|black", value_parser = values::hdri)]
@@ -317,6 +335,59 @@ pub(crate) struct SceneArgs {
     /// Show only where NX x + NY y + NZ z <= D, in world units; may be given several times
     #[arg(long, value_name = "NX,NY,NZ,D", value_parser = values::plane, allow_hyphen_values = true, action = clap::ArgAction::Append)]
     pub(crate) clip_plane: Vec<Plane>,
+}
+
+/// Without any of these nothing is played: everything is where the file has it.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Animation (glTF)")]
+pub(crate) struct AnimationArgs {
+    /// Which animation is played: by name, by number from 0 (`inspect` lists them), or all at once [default: the first]
+    #[arg(long, value_name = "NAME|INDEX|all", value_parser = values::animation)]
+    pub(crate) animation: Option<AnimationChoice>,
+
+    /// The moment to show, as 1.25s, 1.25 or 40ms; before its first key and after its last an animation stands still
+    #[arg(long, value_name = "TIME", value_parser = values::moment, allow_hyphen_values = true)]
+    pub(crate) animation_time: Option<f64>,
+
+    /// The moment of this frame: its number / --fps
+    #[arg(long, value_name = "N", conflicts_with = "animation_time")]
+    pub(crate) frame: Option<u32>,
+
+    /// Render frames A to B-1, each to a file of its own: -o NAME_%04d.png
+    #[arg(long, value_name = "A..B", value_parser = values::frames,
+          conflicts_with_all = ["animation_time", "frame", "checkpoint", "resume", "samples_range"])]
+    pub(crate) frames: Option<(u32, u32)>,
+
+    /// Frames in a second
+    #[arg(long, value_name = "F", default_value = "24", value_parser = values::positive)]
+    pub(crate) fps: f64,
+
+    /// Render no frame whose file is there
+    #[arg(long, requires = "frames")]
+    pub(crate) skip_existing: bool,
+
+    /// For how long the shutter is open from that moment on, as 20ms: what moves as a whole meanwhile is blurred (see
+    /// --motion-steps); meshes that change their shape, cameras and lights are not
+    #[arg(long, value_name = "TIME", value_parser = values::time)]
+    pub(crate) shutter: Option<Duration>,
+}
+
+impl AnimationArgs {
+    /// The moment that is asked for; that of the first frame.
+    pub(crate) fn play(&self) -> Option<Play> {
+        let first = self.frames.map(|(first, _)| first).or(self.frame);
+        let asked = first.is_some() || self.animation_time.is_some();
+        (asked || self.animation.is_some() || self.shutter.is_some()).then(|| Play {
+            animation: self.animation.clone().unwrap_or_default(),
+            time: self.animation_time.unwrap_or_else(|| self.time_of(first.unwrap_or(0))),
+            shutter: self.shutter.map_or(0.0, |s| s.as_secs_f64()),
+        })
+    }
+
+    /// When a frame is.
+    pub(crate) fn time_of(&self, frame: u32) -> f64 {
+        f64::from(frame) / self.fps
+    }
 }
 
 #[derive(Args, Debug)]

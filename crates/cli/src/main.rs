@@ -17,6 +17,8 @@ mod progress;
 mod query;
 mod render;
 mod report;
+mod sequence;
+mod shot;
 mod simd;
 mod target;
 mod values;

@@ -3,10 +3,8 @@
 use std::fs::File;
 use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use firsthit_accel::{BuildOptions, SceneBuilder};
 use firsthit_import::scene::Settings;
 use firsthit_import::{Imported, Report};
 use firsthit_render::{
@@ -25,14 +23,20 @@ use crate::progress::{Keep, Progress, Style, duration};
 use crate::report::{
     Ablation, Counts, Paths, RenderReport, Seconds, effects, explain_effects, rays_in_words, warnings,
 };
-use crate::simd;
+use crate::sequence::Sequence;
+use crate::shot::Shot;
 use crate::target::{Target, writable};
 use crate::values::{Explain, Hdri, Resolution, Switch};
 
 /// Renders a model as the arguments say.
 pub(crate) fn run(args: &RenderArgs, config: Option<&Path>) -> Result<Exit, Failure> {
     let console = Console::new(args.run.quiet, args.run.verbose);
-    let target = Target::new(args.output.output.as_deref(), &args.model)?;
+    let sequence = Sequence::new(args)?;
+    let output = args.output.output.as_deref();
+    let target = match &sequence {
+        Some(sequence) => sequence.target(sequence.first(), &args.model)?,
+        None => Target::new(output, &args.model)?,
+    };
     if target == Target::Stdout && args.run.json {
         let failure = Failure::usage("`-o -` and `--json` both want the standard output");
         return Err(failure.hint("write the image to a file: -o FILE"));
@@ -52,39 +56,49 @@ pub(crate) fn run(args: &RenderArgs, config: Option<&Path>) -> Result<Exit, Fail
         pool = pool.num_threads(threads.into());
     }
     let pool = pool.build().map_err(|e| Failure::failed(format_args!("threads: {e}")))?;
-    let interrupt = Interrupt::listen(console, "writing the image so far");
-    pool.install(|| Job { args, config, console, target, interrupt }.run())
+    let then = if sequence.is_some() { "the frame at hand is not written" } else { "writing the image so far" };
+    let interrupt = Interrupt::listen(console, then);
+    let shot = Shot::new(args);
+    let mut job = Job { args, config, console, target, interrupt, shot, in_sequence: sequence.is_some() };
+    pool.install(|| match &sequence {
+        Some(sequence) => sequence.run(&mut job),
+        None => job.run(),
+    })
 }
 
-/// One render.
-struct Job<'a> {
-    args: &'a RenderArgs,
+/// One render, or one after the other.
+pub(crate) struct Job<'a> {
+    pub(crate) args: &'a RenderArgs,
     /// The configuration file that was read.
     config: Option<&'a Path>,
-    console: Console,
-    target: Target,
-    interrupt: Interrupt,
+    pub(crate) console: Console,
+    pub(crate) target: Target,
+    pub(crate) interrupt: Interrupt,
+    pub(crate) shot: Shot,
+    /// It is one of several frames: only whole ones are written.
+    in_sequence: bool,
 }
 
 impl Job<'_> {
-    fn run(&self) -> Result<Exit, Failure> {
+    /// Renders what the shot has before the camera, and writes it.
+    pub(crate) fn run(&mut self) -> Result<Exit, Failure> {
         let mut seconds = Seconds::default();
         let args = self.args;
 
         let started = Instant::now();
         self.console.detail(format_args!("reading {}", args.model.display()));
-        let options = firsthit_import::Options {
-            up: args.scene.up,
-            variant: args.scene.variant.clone(),
-            without_occlusion: true,
-            ..Default::default()
-        };
-        let Imported { scene, report } = firsthit_import::open(&args.model, &options)?;
-        self.console.warnings(&report, args.run.strict)?;
+        let Imported { scene, report } = self.shot.read(args)?;
+        if self.shot.is_first() || args.run.strict {
+            self.console.warnings(&report, args.run.strict)?;
+        }
+        if self.shot.is_first() && self.shot.play.is_some() && report.animations.is_empty() {
+            self.console.say(format_args!("{}: has no animation: it stands still", args.model.display()));
+        }
         self.spare_what_was_read(&report)?;
         let options = render_options(args, &scene.settings)?;
         options.check().map_err(|e| self.at_model(&e))?;
-        let stage_options = stage_options(args, &options, &self.target)?;
+        let mut stage_options = stage_options(args, &options, &self.target)?;
+        self.shot.place_camera(args, &scene, &report, &mut stage_options)?;
         seconds.load = started.elapsed().as_secs_f64();
 
         let asked = args.quality.checkpoint.is_some() || args.quality.resume.is_some();
@@ -102,10 +116,8 @@ impl Job<'_> {
         };
         let started = Instant::now();
         self.console.detail("building trees");
-        let build = BuildOptions { precision: args.quality.precision, simd: simd::level()?, ..Default::default() };
-        let trees = SceneBuilder::from_desc(&scene, build).build().map_err(|e| self.at_model(&e))?;
         let counts = Counts::new(&scene);
-        let stage = Stage::new(Arc::new(scene), trees, &stage_options).map_err(|e| self.at_model(&e))?;
+        let (stage, followed) = self.shot.stage(args, scene, &stage_options)?;
         seconds.build = started.elapsed().as_secs_f64();
         if args.run.explain >= Explain::Costs {
             stage.explain().iter().for_each(message);
@@ -114,6 +126,7 @@ impl Job<'_> {
         }
 
         if Effort::new(&args.quality).announce
+            && self.shot.is_first()
             && let (Some(noise), Some(limit)) = (options.noise_threshold, options.time_limit)
         {
             self.console.say(format_args!(
@@ -132,6 +145,10 @@ impl Job<'_> {
         progress.finish();
         let rendered = rendered.map_err(|e| self.at_model(&e))?;
         seconds.render = started.elapsed().as_secs_f64();
+        if self.in_sequence && rendered.interrupted {
+            self.console.say("interrupted: this frame is not written");
+            return Ok(Exit::Interrupted);
+        }
 
         let started = Instant::now();
         let files = self.write(&rendered)?;
@@ -152,7 +169,8 @@ impl Job<'_> {
             ablation.iter().flat_map(Ablation::lines).for_each(message);
             Paths::new(&rendered.stats.light).iter().map(Paths::in_words).for_each(|words| message(&words));
         }
-        self.console.say(self.summary(&rendered, counts, seconds));
+        let followed = followed.map_or(String::new(), |followed| format!("; {followed}"));
+        self.console.say(self.summary(&rendered, counts, seconds) + &followed);
         if args.run.json {
             let picture = rendered.film.window();
             print_json(&RenderReport {
@@ -188,6 +206,7 @@ impl Job<'_> {
         kept?;
         // The picture is there to be looked at, whatever is said about it.
         self.console.bad_samples(rendered.stats.bad_samples, args.run.strict)?;
+        self.shot.keep(stage);
         Ok(if rendered.interrupted { Exit::Interrupted } else { Exit::Done })
     }
 
@@ -230,11 +249,15 @@ impl Job<'_> {
         }
         let (scene, precision) = (&self.args.scene, self.args.quality.precision);
         Ok(format!(
-            "firsthit {}\n{}\n{options:?}\n{stage:?}\n{precision:?} {:?} {:?} {}",
+            "firsthit {}\n{}\n{options:?}\n{stage:?}\n{precision:?} {:?} {:?} {:?} {:?} {:?} {:?} {}",
             env!("CARGO_PKG_VERSION"),
             files.join("\n"),
             scene.up,
             scene.variant,
+            scene.scene,
+            scene.points,
+            scene.lines,
+            self.args.animation.play(),
             // Which of the files it is.
             self.hdri().and_then(Path::file_name).unwrap_or_default().to_string_lossy(),
         ))
@@ -310,8 +333,12 @@ impl Job<'_> {
     }
 
     fn at_model(&self, error: &dyn std::error::Error) -> Failure {
-        Failure::failed(format_args!("{}: {error}", self.args.model.display()))
+        at_model(self.args, error)
     }
+}
+
+pub(crate) fn at_model(args: &RenderArgs, error: &dyn std::error::Error) -> Failure {
+    Failure::failed(format_args!("{}: {error}", args.model.display()))
 }
 
 /// A file by its name, length and content (FNV-1a of 64 bits: against mix-ups, not against forgery).

@@ -5,7 +5,7 @@ use std::str::FromStr;
 use std::time::Duration;
 
 use firsthit_accel::{BuildQuality, Layout};
-use firsthit_import::srgb;
+use firsthit_import::{AnimationChoice, srgb};
 use firsthit_measure::scenario::{self, Scenario};
 use firsthit_render::sampler::SamplerChoice;
 use firsthit_render::{
@@ -86,6 +86,28 @@ pub(crate) fn time(s: &str) -> Result<Duration, String> {
         .filter(|s| *s > 0.0)
         .and_then(|s| Duration::try_from_secs_f64(s).ok())
         .ok_or_else(|| "expected a time above 0, as in 30s, 5m or 1h".into())
+}
+
+/// A moment in seconds, also before the beginning.
+pub(crate) fn moment(s: &str) -> Result<f64, String> {
+    let number = |text: &str, unit: f64| finite(text).map(|x| x * unit);
+    let seconds = match (s.strip_suffix("ms"), s.strip_suffix('s')) {
+        (Some(text), _) => number(text, 1e-3),
+        (None, Some(text)) => number(text, 1.0),
+        (None, None) => number(s, 1.0),
+    };
+    seconds.ok_or_else(|| "expected a time, as in 1.25s, 1.25 or 40ms".into())
+}
+
+/// The first frame, and the one after the last.
+pub(crate) fn frames(s: &str) -> Result<(u32, u32), String> {
+    let range = s.split_once("..").and_then(|(a, b)| Some((whole(a)?, whole(b)?)));
+    range.filter(|(a, b)| a < b).ok_or_else(|| "expected A..B with A below B, as in 0..48".into())
+}
+
+/// An animation by name or number, or all of them.
+pub(crate) fn animation(s: &str) -> Result<AnimationChoice, String> {
+    Ok(if s == "all" { AnimationChoice::All } else { AnimationChoice::Named(s.to_owned()) })
 }
 
 pub(crate) fn sampler(s: &str) -> Result<SamplerChoice, String> {
@@ -398,6 +420,15 @@ mod tests {
     fn shares_begin_at_blocks() {
         assert_eq!(samples("64..100"), Ok((64, 100)));
         assert!(["1..2", "16..16", "32..16", "16", "..", "a..b"].iter().all(|s| samples(s).is_err()));
+    }
+
+    #[test]
+    fn moments_and_frames_are_read() {
+        assert_eq!(["1.25s", "-1", "40ms", "0"].map(moment), [1.25, -1.0, 0.04, 0.0].map(Ok));
+        assert!(["", "s", "1m", "nan", "1 hour"].iter().all(|s| moment(s).is_err()));
+        assert_eq!(frames("0..48"), Ok((0, 48)));
+        assert!(["3..3", "4..3", "3", "-1..2", ".."].iter().all(|s| frames(s).is_err()));
+        assert_eq!(animation("all"), Ok(AnimationChoice::All));
     }
 
     #[test]

@@ -16,6 +16,7 @@
 #![forbid(unsafe_code)]
 
 mod bake;
+mod cache;
 mod error;
 mod files;
 pub mod gltf;
@@ -26,17 +27,21 @@ pub mod obj;
 mod open;
 mod place;
 mod plain;
+mod play;
 pub mod ply;
 mod report;
 pub mod scene;
+mod shutter;
 pub mod srgb;
 pub mod stl;
 #[cfg(test)]
 mod tests;
 pub mod toml;
 
+pub use cache::ImageCache;
 pub use error::{ErrorKind, ImportError};
 pub use limits::Limits;
 pub use open::{Imported, NotAnAxis, Options, UpAxis, open};
+pub use play::{AnimationChoice, AnimationInfo, Play};
 pub use report::{ExtensionUse, Report, Support, Warning};
 pub use scene::SceneDesc;

@@ -9,7 +9,10 @@ use glam::{DAffine3, DMat3, DVec3};
 
 use crate::scene::SurfaceDesc;
 use crate::toml::Inclusion;
-use crate::{ErrorKind, ImportError, Limits, Report, SceneDesc, files, gltf, obj, ply, stl, toml};
+use crate::{
+    AnimationChoice, ErrorKind, ImageCache, ImportError, Limits, Play, Report, SceneDesc, files, gltf, obj, ply, stl,
+    toml,
+};
 
 /// Which axis of the file points up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -75,6 +78,14 @@ pub struct Options {
     pub up: Option<UpAxis>,
     /// The variant of materials to show, by name or number (glTF's KHR_materials_variants). `None`: the file's default.
     pub variant: Option<String>,
+    /// The scene of the file to show, by name or number (glTF's `scenes`). `None`: the file's default.
+    pub scene: Option<String>,
+    /// The moment of the file's animations to show. `None`: everything is where the file has it, and nothing is played.
+    pub play: Option<Play>,
+    /// How thick points and lines are drawn (glTF's; OBJ has none that are read).
+    pub strokes: gltf::Strokes,
+    /// Keeps decoded images (glTF's) for when the file is read again.
+    pub images: Option<ImageCache>,
     /// Leave the images out that nothing but occlusion textures show, which a ray tracer has no use for: a white pixel
     /// stands for each (glTF alone).
     pub without_occlusion: bool,
@@ -116,7 +127,16 @@ pub struct Imported {
 pub fn open(path: impl AsRef<Path>, options: &Options) -> Result<Imported, ImportError> {
     let path = path.as_ref();
     let file = if path.is_dir() { only_model(path)? } else { path.to_owned() };
-    let mut imported = read_as(Format::of(&file)?, &file, options, &Inclusion::default())?;
+    let format = Format::of(&file)?;
+    let mut imported = read_as(format, &file, options, &Inclusion::default())?;
+    if let Some(play) = options.play.as_ref().filter(|play| play.shutter > 0.0) {
+        let play = Play { time: play.time + play.shutter, shutter: 0.0, ..play.clone() };
+        let options = Options { play: Some(play), ..options.clone() };
+        let later = read_as(format, &file, &options, &Inclusion::default())?;
+        if let Some(message) = imported.scene.move_to(&later.scene) {
+            imported.report.warn(&file, "", message);
+        }
+    }
     if let Some(up) = options.up {
         imported.scene.transform(up.to_y());
     }
@@ -192,9 +212,8 @@ pub(crate) fn read_as(
 ) -> Result<Imported, ImportError> {
     let bytes = files::read(file, &options.limits)?;
     let is_gltf = format == Format::Gltf || (format == Format::Json && is_gltf_json(&bytes));
-    if let Some(variant) = options.variant.as_ref().filter(|_| !is_gltf) {
-        let cause = format!("there is no variant '{variant}': only glTF files have variants");
-        return Err(ImportError::unsupported(file, "", cause));
+    if !is_gltf {
+        check_choices(format, file, options)?;
     }
     match format {
         // Whatever it is called.
@@ -206,6 +225,25 @@ pub(crate) fn read_as(
         Format::Gltf => gltf::read_bytes(&bytes, file, options),
         Format::Json if is_gltf => gltf::read_bytes(&bytes, file, options),
         Format::Toml | Format::Json => toml::read_bytes(&bytes, file, options, including),
+    }
+}
+
+/// What only glTF files have is not asked of other ones; scene files pass it on to the models in them.
+fn check_choices(format: Format, file: &Path, options: &Options) -> Result<(), ImportError> {
+    let variant = options.variant.as_ref().map(|v| ("variant", v));
+    let scene = options.scene.as_ref().map(|s| ("scene", s));
+    let animation = match options.play.as_ref().map(|play| &play.animation) {
+        Some(AnimationChoice::Named(name)) if !matches!(format, Format::Toml | Format::Json) => {
+            Some(("animation", name))
+        }
+        _ => None,
+    };
+    match variant.or(scene).or(animation) {
+        Some((what, name)) => {
+            let cause = format!("there is no {what} '{name}': only glTF files have {what}s");
+            Err(ImportError::unsupported(file, "", cause))
+        }
+        None => Ok(()),
     }
 }
 

@@ -4,6 +4,8 @@ use std::collections::BTreeSet;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use crate::AnimationInfo;
+
 /// Something in a file that could not be honoured, though reading went on.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Warning {
@@ -65,7 +67,7 @@ pub struct ExtensionUse {
 }
 
 /// What came up while reading.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Report {
     /// The first warnings, in the order of the file (at most 100 of them).
     pub warnings: Vec<Warning>,
@@ -78,8 +80,10 @@ pub struct Report {
     pub extensions: Vec<ExtensionUse>,
     /// Names of the file's variants: the same shapes in other materials.
     pub variants: Vec<String>,
-    /// Animations in the file (they are not played).
-    pub animations: u64,
+    /// The file's animations.
+    pub animations: Vec<AnimationInfo>,
+    /// Names of the scenes of the file (glTF's `scenes`).
+    pub scenes: Vec<String>,
     /// Triangles after instancing over *every* node of every scene in the file, also those that are not shown.
     pub triangles_all_scenes: u64,
 }
@@ -114,6 +118,6 @@ impl Report {
                 self.extensions.push(e);
             }
         }
-        self.animations += other.animations;
+        self.animations.extend(other.animations);
     }
 }

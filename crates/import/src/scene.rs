@@ -220,6 +220,17 @@ pub enum Pixels {
 }
 
 impl Pixels {
+    /// Whether they are the very same, in the same place of memory.
+    #[must_use]
+    pub fn is_same(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Rgba8(a), Self::Rgba8(b)) => Arc::ptr_eq(a, b),
+            (Self::Rgba16(a), Self::Rgba16(b)) => Arc::ptr_eq(a, b),
+            (Self::Rgb32F(a), Self::Rgb32F(b)) => Arc::ptr_eq(a, b),
+            _ => false,
+        }
+    }
+
     /// Their size in memory.
     #[must_use]
     pub fn bytes(&self) -> u64 {

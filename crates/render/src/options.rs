@@ -5,6 +5,7 @@ use std::time::Duration;
 use firsthit_import::scene::ImageDesc;
 use glam::{DVec3, Vec3};
 
+use crate::framing::Framing;
 use crate::sampler::SamplerChoice;
 use crate::{Aov, EffectSet};
 
@@ -220,13 +221,15 @@ pub struct EffectOverrides {
 }
 
 /// Which camera.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub enum CameraChoice {
     /// The scene's first camera if it has one and says it is for viewing (scene files), else a framed view.
     #[default]
     Auto,
     /// The file's camera of this name, or else of this index.
     Named(String),
+    /// One that was found before, as for all frames of an animation.
+    Framed(Box<Framing>),
 }
 
 /// Changes to the chosen camera; the names are F3D's.

@@ -16,7 +16,7 @@ use crate::light::area::{AreaLights, Glow, ShapeLight};
 use crate::light::choice::LightChoice;
 use crate::light::environment::{Environment, EnvironmentError};
 use crate::light::punctual::PunctualLight;
-use crate::material::{Conventions, Material, Textures};
+use crate::material::{Conventions, Made, Material, Textures};
 use crate::setting::{self, Setting};
 use crate::surface::World;
 use crate::texture::TextureError;
@@ -89,6 +89,8 @@ pub struct Stage {
     moments: Vec<Stage>,
     plan: EffectPlan,
     explain: Vec<String>,
+    /// The images with their smaller copies, for the next frame.
+    textures: Arc<Made>,
 }
 
 /// What rays have to ask a material before they take a hit for one.
@@ -153,6 +155,29 @@ impl Stage {
         accel: firsthit_accel::Scene,
         options: &StageOptions,
     ) -> Result<Self, StageError> {
+        Self::make(scene, accel, options, None)
+    }
+
+    /// The stage of another frame of the same animation, as [`Stage::new`] makes it; what was worked out for images that
+    /// both have is shared.
+    ///
+    /// # Errors
+    /// As [`Stage::new`].
+    pub fn next_frame(
+        &self,
+        scene: Arc<SceneDesc>,
+        accel: firsthit_accel::Scene,
+        options: &StageOptions,
+    ) -> Result<Self, StageError> {
+        Self::make(scene, accel, options, Some(self))
+    }
+
+    fn make(
+        scene: Arc<SceneDesc>,
+        accel: firsthit_accel::Scene,
+        options: &StageOptions,
+        before: Option<&Self>,
+    ) -> Result<Self, StageError> {
         let reference = scene.settings.reference_conventions;
         let mut explain = Vec::new();
         let mut camera = choose_camera(&scene, &accel, options, &mut explain)?;
@@ -211,6 +236,9 @@ impl Stage {
         let conventions = Conventions { reference, effects, energy_compensation };
         let mips = !reference && options.texture_filter == TextureFilter::Trilinear;
         let mut textures = Textures::new(&scene.images, mips);
+        if let Some(before) = before {
+            textures.take_over(&before.scene().images, &before.textures);
+        }
         let default = MaterialDesc::default();
         let materials = scene
             .materials
@@ -218,6 +246,7 @@ impl Stage {
             .chain([&default])
             .map(|m| Material::new(m, &mut textures, conventions))
             .collect::<Result<Arc<[_]>, _>>()?;
+        let textures = Arc::new(textures.made());
         let flags = materials.iter().map(|m| Flags {
             culls: !reference && m.culls(),
             alpha: m.has_alpha(),
@@ -279,6 +308,7 @@ impl Stage {
             moments: Vec::new(),
             plan,
             explain,
+            textures,
         };
         if let Some(view) = view.filter(|_| dim) {
             stage.lights.ambient = survey::even_light(&stage, &view, options.aspect);
@@ -416,6 +446,7 @@ fn choose_camera(
     explain: &mut Vec<String>,
 ) -> Result<Camera, StageError> {
     let chosen = match &options.camera {
+        CameraChoice::Framed(_) => None,
         CameraChoice::Auto => scene.settings.camera.filter(|i| *i < scene.cameras.len()),
         CameraChoice::Named(wanted) => {
             let by_name = scene.cameras.iter().position(|c| c.name == *wanted);
@@ -433,7 +464,10 @@ fn choose_camera(
             Camera::from_desc(&scene.cameras[i], &accel.bounds())?
         }
         None => {
-            let framing = framing::frame(scene, accel, options.aspect);
+            let framing = match &options.camera {
+                CameraChoice::Framed(framing) => (**framing).clone(),
+                _ => framing::frame(scene, accel, options.aspect),
+            };
             explain.push(format!("camera: {}", framing.reason));
             framing.camera
         }

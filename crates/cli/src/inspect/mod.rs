@@ -64,7 +64,8 @@ struct Inspection<'a> {
     textures: usize,
     lights: usize,
     cameras: usize,
-    animations: u64,
+    animations: usize,
+    scenes: usize,
     /// Names of the file's variants of materials.
     variants: &'a [String],
     /// Of what has an end, in world units.
@@ -74,6 +75,9 @@ struct Inspection<'a> {
     texture_list: Vec<Texture<'a>>,
     light_list: Vec<Named<'a>>,
     camera_list: Vec<Named<'a>>,
+    animation_list: Vec<Animation<'a>>,
+    /// Names of the scenes of the file.
+    scene_list: &'a [String],
     extensions: Vec<Extension<'a>>,
     bvh: Bvh,
     effects: Vec<Effect<'a>>,
@@ -136,6 +140,15 @@ struct Named<'a> {
 }
 
 #[derive(Serialize)]
+struct Animation<'a> {
+    name: &'a str,
+    /// When its last key is.
+    seconds: f64,
+    /// Properties that it changes.
+    channels: u64,
+}
+
+#[derive(Serialize)]
 struct Extension<'a> {
     name: &'a str,
     required: bool,
@@ -186,7 +199,8 @@ impl<'a> Inspection<'a> {
             textures: scene.images.len(),
             lights: scene.lights.len(),
             cameras: scene.cameras.len(),
-            animations: report.animations,
+            animations: report.animations.len(),
+            scenes: report.scenes.len(),
             variants: &report.variants,
             bounds: bounds.is_finite().then(|| Bounds { min: bounds.min.to_array(), max: bounds.max.to_array() }),
             material_list: scene.materials.iter().map(|m| material(&m.name, &m.model)).collect(),
@@ -201,6 +215,12 @@ impl<'a> Inspection<'a> {
                 .iter()
                 .map(|c| Named { name: &c.name, kind: projection_kind(&c.projection) })
                 .collect(),
+            animation_list: report
+                .animations
+                .iter()
+                .map(|a| Animation { name: &a.name, seconds: a.seconds, channels: a.channels })
+                .collect(),
+            scene_list: &report.scenes,
             extensions: report
                 .extensions
                 .iter()

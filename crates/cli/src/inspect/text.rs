@@ -45,7 +45,13 @@ impl fmt::Display for Inspection<'_> {
         row(f, "cameras", grouped(self.cameras as u64))?;
         list(f, &self.camera_list, |c| (c.name, c.kind.into()))?;
         if self.animations > 0 {
-            row(f, "animations", format!("{} (not played)", self.animations))?;
+            row(f, "animations", grouped(self.animations as u64))?;
+            list(f, &self.animation_list, |a| {
+                (a.name, format!("{} s, {}", significant(a.seconds), count(a.channels, "channel")))
+            })?;
+        }
+        if self.scenes > 1 {
+            row(f, "scenes", visible(&self.scene_list.join(", ")).into_owned())?;
         }
         if !self.variants.is_empty() {
             row(f, "variants", visible(&self.variants.join(", ")).into_owned())?;

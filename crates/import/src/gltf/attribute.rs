@@ -15,6 +15,8 @@ use crate::{ImportError, Report};
 const FLOAT: &[Format] = &[(F32, false)];
 /// Fractions: floats or normalised unsigned integers.
 const FRACTIONS: &[Format] = &[(F32, false), (U8, true), (U16, true)];
+/// Changes of texture coordinates and colours: floats or normalised integers.
+const DELTAS: &[Format] = &[(F32, false), (I8, true), (U8, true), (I16, true), (U16, true)];
 const INDICES: &[Format] = &[(U8, false), (U16, false), (U32, false)];
 const JOINTS: &[Format] = &[(U8, false), (U16, false)];
 /// Positions and texture coordinates by KHR_mesh_quantization.
@@ -82,6 +84,23 @@ impl Attributes<'_> {
         };
         let values = self.clean(values, at);
         Ok(values.into_iter().map(|c| Vec4::from(c).clamp(Vec4::ZERO, Vec4::ONE)).collect())
+    }
+
+    /// The changes that morph targets make to texture coordinates.
+    pub(super) fn uv_deltas(&mut self, index: Index<json::Accessor>, at: &str) -> Values<Vec2> {
+        let values = self.accessor(index, at, &[Type::Vec2], DELTAS)?.floats();
+        Ok(self.clean(values, at).into_iter().map(Vec2::from).collect())
+    }
+
+    /// The changes that morph targets make to colours.
+    pub(super) fn color_deltas(&mut self, index: Index<json::Accessor>, at: &str) -> Values<Vec4> {
+        let accessor = self.accessor(index, at, &[Type::Vec3, Type::Vec4], DELTAS)?;
+        let values = if accessor.kind == Type::Vec3 {
+            accessor.floats().into_iter().map(|[r, g, b]| [r, g, b, 0.0]).collect()
+        } else {
+            accessor.floats()
+        };
+        Ok(self.clean(values, at).into_iter().map(Vec4::from).collect())
     }
 
     /// One set of joints and weights.

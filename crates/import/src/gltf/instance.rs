@@ -34,7 +34,7 @@ enum Placement {
 pub(super) fn place(
     source: &Source<'_>,
     nodes: &Nodes,
-    variant: Option<u32>,
+    mut reader: MeshReader<'_>,
     scene: &mut SceneDesc,
     report: &mut Report,
 ) -> Result<(), ImportError> {
@@ -44,7 +44,6 @@ pub(super) fn place(
             shown_by.entry(mesh.value()).or_default().push((node, placement(source, node)));
         }
     }
-    let mut reader = MeshReader::new(source, variant)?;
     // By node, since instances are in the order of nodes, not of meshes.
     let mut placed: BTreeMap<usize, (usize, DAffine3)> = BTreeMap::new();
     for (i, json) in source.root.meshes.iter().enumerate() {
@@ -71,7 +70,7 @@ pub(super) fn place(
             placed.extend(add_mesh(scene, &name, primitives).map(|mesh| (node, (mesh, transform))));
         }
     }
-    mesh::warn_of_undrawn(source, report);
+    reader.warn_of_undrawn(report);
     // The node of each instance.
     let mut drawn: Vec<usize> = Vec::new();
     let mut weight = 0_u64;

@@ -12,12 +12,12 @@ use crate::ImportError;
 
 /// A file's JSON.
 pub(super) struct Document {
-    /// The typed model, without animations: nothing here plays them, so that nothing in them can be wrong.
+    /// The typed model, without animations: in one that is not played nothing can be wrong.
     pub(super) root: Root,
     /// The tree of values, which keeps numbers in f64.
     pub(super) value: Value,
-    /// How many animations there are.
-    pub(super) animations: u64,
+    /// The animations, which are not in the tree.
+    pub(super) animations: Vec<Value>,
 }
 
 /// Reads the JSON text.
@@ -32,8 +32,11 @@ pub(super) fn parse(file: &Path, text: &[u8]) -> Result<Document, ImportError> {
     let mut value: Value =
         serde_json::from_slice(&text[..end]).map_err(|e| ImportError::invalid(file, "", format!("not JSON: {e}")))?;
     check_version(file, &value)?;
-    let animations = value.get_mut("animations").map_or(Value::Null, Value::take);
-    let animations = animations.as_array().map_or(0, |a| a.len() as u64);
+    let mut animations = match value.get_mut("animations").map(Value::take) {
+        Some(Value::Array(animations)) => animations,
+        _ => Vec::new(),
+    };
+    animations.iter_mut().for_each(whole_numbers);
     if let Some(object) = value.as_object_mut() {
         object.remove("animations");
     }
@@ -224,6 +227,25 @@ pub(super) fn extension_source(texture: &gltf::json::Texture, name: &str) -> Opt
     Some(source.as_u64().and_then(|i| u32::try_from(i).ok()).unwrap_or(u32::MAX))
 }
 
+/// The number of an element that is asked for by name, or else by number.
+///
+/// # Errors
+/// If there is none; the error names those that there are.
+pub(super) fn by_name<'a>(
+    file: &Path,
+    what: &str,
+    wanted: &str,
+    names: impl Iterator<Item = &'a str> + Clone,
+) -> Result<usize, ImportError> {
+    let count = names.clone().count();
+    let number = || wanted.parse().ok().filter(|i| *i < count);
+    names.clone().position(|name| name == wanted).or_else(number).ok_or_else(|| {
+        let list: Vec<String> = names.enumerate().map(|(i, name)| format!("{i} '{name}'")).collect();
+        let there = if count == 0 { "the file has none".to_owned() } else { format!("there are {}", list.join(", ")) };
+        ImportError::invalid(file, "", format!("there is no {what} '{wanted}': {there}"))
+    })
+}
+
 struct References<'a> {
     file: &'a Path,
 }
@@ -296,9 +318,9 @@ mod tests {
     }
 
     #[test]
-    fn animations_are_only_counted() {
+    fn animations_are_set_aside() {
         let text = r#"{"asset": {"version": "2.0"}, "animations": [{"channels": "none"}, 7]}"#;
-        assert_eq!(parse(Path::new(""), text.as_bytes()).unwrap().animations, 2);
+        assert_eq!(parse(Path::new(""), text.as_bytes()).unwrap().animations.len(), 2);
     }
 
     #[test]

@@ -1,15 +1,17 @@
 //! Primitives of meshes: vertex attributes, indices, topologies, morph targets
 //! (glTF 2.0 specification, section 3.7.2).
 
-use glam::{Affine2, Vec3};
+use glam::{Affine2, Vec3, Vec4};
 use gltf::json::mesh::{Mode, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{self, Index};
+use serde_json::Value;
 
 use super::attribute::Attributes;
 use super::bake::Influence;
 use super::draco::DracoPrimitives;
 use super::source::Source;
+use super::stroke::{self, Strokes};
 use super::tangent;
 use super::variant;
 use crate::scene::TriangleMesh;
@@ -35,6 +37,9 @@ pub(super) struct NormalMapping {
 /// Reads meshes, within the limits of a scene.
 pub(super) struct MeshReader<'a> {
     source: &'a Source<'a>,
+    /// The file's JSON: the typed model does not have all that morph targets change.
+    value: &'a Value,
+    strokes: Strokes,
     quantized: bool,
     draco: DracoPrimitives,
     variant: Option<u32>,
@@ -48,25 +53,6 @@ fn makes_triangles(mode: Mode) -> bool {
     matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)
 }
 
-/// Warns, once for a file, of primitives of points and lines.
-pub(super) fn warn_of_undrawn(source: &Source<'_>, report: &mut Report) {
-    let mut count = 0_u64;
-    let mut first = None;
-    for (i, mesh) in source.root.meshes.iter().enumerate() {
-        for (number, primitive) in mesh.primitives.iter().enumerate() {
-            let has_positions = primitive.attributes.contains_key(&Checked::Valid(Semantic::Positions));
-            if matches!(primitive.mode, Checked::Valid(mode) if has_positions && !makes_triangles(mode)) {
-                count += 1;
-                first.get_or_insert((i, number));
-            }
-        }
-    }
-    if let Some((i, number)) = first {
-        let message = format!("{count} primitives of points or lines are not drawn");
-        report.warn(source.file, format!("/meshes/{i}/primitives/{number}"), message);
-    }
-}
-
 /// How often vertices may be read on average, against small files that make endless work.
 const MOST_SHARING: u64 = 4;
 
@@ -74,14 +60,39 @@ const MOST_SHARING: u64 = 4;
 const MOST_SETS: u32 = 8;
 
 impl<'a> MeshReader<'a> {
-    /// Materials are those of a variant, if one is given.
+    /// `value` is the JSON of the source. Materials are those of a variant, if one is given.
     ///
     /// # Errors
     /// If a compressed primitive cannot be decoded.
-    pub(super) fn new(source: &'a Source<'a>, variant: Option<u32>) -> Result<Self, ImportError> {
+    pub(super) fn new(
+        source: &'a Source<'a>,
+        value: &'a Value,
+        variant: Option<u32>,
+        strokes: Strokes,
+    ) -> Result<Self, ImportError> {
         let quantized = source.uses("KHR_mesh_quantization");
         let draco = DracoPrimitives::new(source)?;
-        Ok(Self { source, quantized, draco, variant, read: 0, vertices: 0, triangles: 0 })
+        Ok(Self { source, value, strokes, quantized, draco, variant, read: 0, vertices: 0, triangles: 0 })
+    }
+
+    /// Warns, once for a file, of primitives of points and lines that are not drawn.
+    pub(super) fn warn_of_undrawn(&self, report: &mut Report) {
+        let mut count = 0_u64;
+        let mut first = None;
+        for (i, mesh) in self.source.root.meshes.iter().enumerate() {
+            for (number, primitive) in mesh.primitives.iter().enumerate() {
+                let has_positions = primitive.attributes.contains_key(&Checked::Valid(Semantic::Positions));
+                let Checked::Valid(mode) = primitive.mode else { continue };
+                if has_positions && !makes_triangles(mode) && self.strokes.radius(mode).is_none() {
+                    count += 1;
+                    first.get_or_insert((i, number));
+                }
+            }
+        }
+        if let Some((i, number)) = first {
+            let message = format!("{count} primitives of points or lines are not drawn");
+            report.warn(self.source.file, format!("/meshes/{i}/primitives/{number}"), message);
+        }
     }
 
     /// Reads the primitives of a mesh that make triangles, with its morph targets by `weights` (the mesh's own where
@@ -181,19 +192,31 @@ impl<'a> MeshReader<'a> {
                 let deltas = attributes.normals(index, &at("TANGENT"))?;
                 mesh.tangents.iter_mut().zip(deltas).for_each(|(t, d)| *t += weighted(d).extend(0.0));
             }
+            let more = self.value.pointer(&format!("{place}/targets/{j}")).and_then(Value::as_object);
+            more_deltas(&mut attributes, more.into_iter().flatten(), j, weight, &mut mesh)?;
         }
+        mesh.colors.iter_mut().for_each(|c| *c = c.clamp(Vec4::ZERO, Vec4::ONE));
         let indices = match json.indices {
             Some(index) => attributes.indices(index, count)?,
             None => (0..count as u32).collect(),
         };
-        if !makes_triangles(mode) {
+        if let Some(radius) = self.strokes.radius(mode) {
+            let most = (indices.len() as u64).saturating_mul(stroke::MOST_ELEMENTS);
+            if most > source.limits.elements {
+                let cause = format!("{} points or lines to be drawn would take too many triangles", indices.len());
+                return Err(source.at(place, ErrorKind::Limit(cause)));
+            }
+            (mesh, influences) = stroke::bodies(&mesh, &influences, mode, &indices, radius);
+        } else if !makes_triangles(mode) {
             return Ok(None);
         }
         if mode == Mode::Triangles && !indices.len().is_multiple_of(3) {
             let message = format!("{} vertices make no whole triangles: the last are left out", indices.len());
             report.warn(source.file, place.as_str(), message);
         }
-        mesh.triangles = triangles(mode, &indices);
+        if makes_triangles(mode) {
+            mesh.triangles = triangles(mode, &indices);
+        }
         let material = variant::material(source, json, self.variant, &place)?;
         let mut primitive = Primitive { number, material, mesh, influences };
         compact(&mut primitive);
@@ -221,6 +244,41 @@ impl<'a> MeshReader<'a> {
         }
         Ok(())
     }
+}
+
+/// Adds what a morph target changes of texture coordinates and colours.
+fn more_deltas<'v>(
+    attributes: &mut Attributes<'_>,
+    target: impl Iterator<Item = (&'v String, &'v Value)>,
+    number: usize,
+    weight: f32,
+    mesh: &mut TriangleMesh,
+) -> Result<(), ImportError> {
+    for (semantic, index) in target {
+        let at = format!("targets/{number}/{semantic}");
+        let set = semantic.strip_prefix("TEXCOORD_").and_then(|s| s.parse::<usize>().ok());
+        if semantic != "COLOR_0" && set.is_none() {
+            continue;
+        }
+        let accessors = attributes.source.root.accessors.len();
+        let Some(index) = index.as_u64().filter(|i| *i < accessors as u64) else {
+            let place = format!("{}/{at}", attributes.place);
+            return Err(attributes.source.invalid(place, format!("no such accessor: there are {accessors}")));
+        };
+        let index = Index::new(index as u32);
+        match set {
+            Some(set) => {
+                let deltas = attributes.uv_deltas(index, &at)?;
+                let uvs = mesh.uvs.get_mut(set).into_iter().flatten();
+                uvs.zip(deltas).for_each(|(uv, d)| *uv += d * weight);
+            }
+            None => {
+                let deltas = attributes.color_deltas(index, &at)?;
+                mesh.colors.iter_mut().zip(deltas).for_each(|(c, d)| *c += d * weight);
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Triangles of a primitive, wound as the specification's section 3.7.2.1 says.
@@ -325,8 +383,6 @@ pub(super) fn complete(mesh: &mut TriangleMesh, mapping: Option<NormalMapping>) 
 
 #[cfg(test)]
 mod tests {
-    use glam::Vec4;
-
     use super::*;
 
     #[test]

@@ -4,10 +4,10 @@
 //! accessors, hierarchy and textures are checked before they are used, so that a damaged file is an error that names
 //! the JSON pointer, the value found and what was expected.
 //!
-//! - The file's default scene is shown, else its first, else all of its root nodes.
+//! - The file's default scene is shown, else its first, else all of its root nodes, unless another one is asked for.
 //! - Transforms are multiplied out in f64. Meshes that several nodes share stay shared.
-//! - Animations are counted but not played: skins and morph targets are shown as the nodes and weights of the file
-//!   have them. A mesh whose node has a transform without an inverse is moved in f64 once and for all where a surface
+//! - Skins and morph targets are shown as the nodes and weights have them: those of the file, or those of its
+//!   animations at the time that is asked for. What animations can change: [`ANIMATED_PROPERTIES`]. A mesh whose node has a transform without an inverse is moved in f64 once and for all where a surface
 //!   is left of it.
 //! - Missing normals are flat, missing tangents are computed by MikkTSpace where a normal texture needs them.
 //! - What is done with each extension: [`EXTENSIONS`].
@@ -19,6 +19,7 @@
 //! ```
 
 mod accessor;
+mod animation;
 mod attribute;
 mod bake;
 mod camera_light;
@@ -35,6 +36,7 @@ mod mesh;
 mod meshopt;
 mod node;
 mod source;
+mod stroke;
 mod tangent;
 #[cfg(test)]
 mod tests;
@@ -48,14 +50,18 @@ use ::gltf::json::validation::Checked;
 use ::gltf::json::{Index, Root};
 
 use accessor::Layout;
+use mesh::MeshReader;
 use node::Nodes;
 use source::Source;
 use texture::Textures;
 
-use crate::scene::SceneDesc;
+use crate::cache::Kept;
+use crate::scene::{ImageDesc, SceneDesc};
 use crate::{ImportError, Imported, Options, Report, files};
 
+pub use animation::{AnimatedProperty, Kind as AnimatedKind, PROPERTIES as ANIMATED_PROPERTIES};
 pub use extensions::{EXTENSIONS, Extension, find as find_extension};
+pub use stroke::Strokes;
 
 /// Reads a glTF 2.0 file: `.gltf` or `.glb`, told apart by its first bytes.
 ///
@@ -84,8 +90,9 @@ pub(crate) fn read_bytes(bytes: &[u8], path: &Path, options: &Options) -> Result
     } else {
         (bytes, None)
     };
-    let json::Document { root, value, animations } = json::parse(path, text)?;
-    let mut report = Report { animations, ..Report::default() };
+    let json::Document { root, mut value, animations } = json::parse(path, text)?;
+    let mut report =
+        Report { animations: animation::list(&animations, &root), scenes: scene_names(&root), ..Report::default() };
     report.reads(path);
     extensions::check(path, &root, &mut report)?;
     json::check_references(path, &root)?;
@@ -93,27 +100,52 @@ pub(crate) fn read_bytes(bytes: &[u8], path: &Path, options: &Options) -> Result
     report.variants = variant::names(&root);
     let variant = variant::choose(&source, options.variant.as_deref(), &report)?;
     check_accessors(&source)?;
-    let nodes = Nodes::new(&source, &value, &mut report)?;
+    let shown = match &options.scene {
+        Some(wanted) => Some(json::by_name(path, "scene", wanted, report.scenes.clone().iter().map(String::as_str))?),
+        None => root.scene.map(|s| s.value()).or((!root.scenes.is_empty()).then_some(0)),
+    };
+    let posed = match &options.play {
+        Some(play) => Some(animation::pose(&source, &animations, play, &mut value, &mut report)?),
+        None => None,
+    };
+    let source = match &posed {
+        Some(root) => source.with_root(root),
+        None => source,
+    };
+    let nodes = Nodes::new(&source, &value, shown, &mut report)?;
     report.triangles_all_scenes = triangles_all_scenes(&root);
 
-    let name = root.scene.and_then(|s| root.scenes[s.value()].name.clone());
+    let chosen = shown.filter(|_| root.scene.is_some() || options.scene.is_some());
+    let name = chosen.and_then(|s| root.scenes[s].name.clone());
     let name = name.or_else(|| path.file_stem().map(|s| s.to_string_lossy().into_owned())).unwrap_or_default();
     let mut scene = SceneDesc { name, ..SceneDesc::default() };
     let mut textures = Textures::new(&source);
     scene.materials = material::read(&source, &mut textures, &mut report, !options.without_occlusion)?;
-    instance::place(&source, &nodes, variant, &mut scene, &mut report)?;
+    let reader = MeshReader::new(&source, &value, variant, options.strokes)?;
+    instance::place(&source, &nodes, reader, &mut scene, &mut report)?;
     for &node in &nodes.shown {
         let world = &nodes.world[node];
         scene.cameras.extend(camera_light::camera(&source, node, world, &mut report)?);
         scene.lights.extend(camera_light::light(&source, node, world, &mut report)?);
     }
-    scene.images = textures.decode(&mut report);
-    let shown = root.scene.map(|s| s.value()).or((!root.scenes.is_empty()).then_some(0));
+    scene.images = images(&source, textures, options, &mut report);
     if let Some((around, image)) = environment::read(&source, shown, scene.images.len(), &mut report)? {
         scene.environment = Some(around);
         scene.images.push(image);
     }
     Ok(Imported { scene, report })
+}
+
+/// The decoded images: those that were kept, if there are any.
+fn images(source: &Source<'_>, textures: Textures<'_>, options: &Options, report: &mut Report) -> Vec<ImageDesc> {
+    let Some(cache) = &options.images else { return textures.decode(report) };
+    if let Some(Kept { images, files }) = cache.get(source.file, textures.count()) {
+        report.files.extend(files);
+        return images;
+    }
+    let images = textures.decode(report);
+    cache.keep(source.file, Kept { images: images.clone(), files: report.files.clone() });
+    images
 }
 
 /// Checks that all buffer views and accessors lie inside their buffers, also those that nothing here reads.
@@ -128,6 +160,11 @@ fn check_accessors(source: &Source<'_>) -> Result<(), ImportError> {
         }
     }
     Ok(())
+}
+
+fn scene_names(root: &Root) -> Vec<String> {
+    let name = |(i, s): (usize, &::gltf::json::Scene)| s.name.clone().unwrap_or_else(|| format!("scene {i}"));
+    root.scenes.iter().enumerate().map(name).collect()
 }
 
 fn triangles_all_scenes(root: &Root) -> u64 {

@@ -16,11 +16,17 @@ pub(super) struct Nodes {
 }
 
 impl Nodes {
-    /// Multiplies out the hierarchy. `value` is the file's JSON: the typed model has transforms only in f32.
+    /// Multiplies out the hierarchy and finds what one scene shows, without a scene what hangs at any root. `value` is
+    /// the file's JSON: the typed model has transforms only in f32.
     ///
     /// # Errors
     /// If a node has two parents or is its own descendant, or a transform makes no sense.
-    pub(super) fn new(source: &Source<'_>, value: &Value, report: &mut Report) -> Result<Self, ImportError> {
+    pub(super) fn new(
+        source: &Source<'_>,
+        value: &Value,
+        scene: Option<usize>,
+        report: &mut Report,
+    ) -> Result<Self, ImportError> {
         let nodes = &source.root.nodes;
         if nodes.len() as u64 > source.limits.instances {
             let cause = format!("{} nodes are more than the limit of {}", nodes.len(), source.limits.instances);
@@ -49,7 +55,7 @@ impl Nodes {
                 world[i] = world[parent] * world[i];
             }
         }
-        let shown = match source.root.scene.map(|s| s.value()).or((!source.root.scenes.is_empty()).then_some(0)) {
+        let shown = match scene {
             Some(scene) => descend(nodes, scene_roots(source, scene, &parents)?, visible),
             None => descend(nodes, (0..nodes.len()).filter(|&i| parents[i].is_none()).collect(), visible),
         };

@@ -166,6 +166,14 @@ impl<'a> Source<'a> {
         self.at(place, ErrorKind::Invalid(cause.into()))
     }
 
+    /// The same data behind another model of the same file, whose references are the same.
+    pub(super) fn with_root<'b>(self, root: &'b Root) -> Source<'b>
+    where
+        'a: 'b,
+    {
+        Source { root, ..self }
+    }
+
     /// Whether the file says that it uses an extension.
     pub(super) fn uses(&self, extension: &str) -> bool {
         let declared = |list: &[String]| list.iter().any(|e| e == extension);

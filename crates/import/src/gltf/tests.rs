@@ -120,3 +120,28 @@ fn images_of_occlusion_alone_are_left_out_where_that_is_asked() {
         assert_eq!(scene.images.iter().map(|i| i.width).collect::<Vec<_>>(), widths);
     }
 }
+
+#[test]
+fn points_and_lines_have_bodies_where_that_is_asked() {
+    let file = json!({
+        "asset": {"version": "2.0"},
+        "accessors": [{"type": "VEC3", "componentType": 5126, "count": 3}],
+        "meshes": [{"primitives": [
+            {"attributes": {"POSITION": 0}, "mode": 0},
+            {"attributes": {"POSITION": 0}, "mode": 3},
+        ]}],
+        "nodes": [{"mesh": 0}],
+    });
+    let strokes = super::Strokes { points: Some(0.5), lines: Some(0.5) };
+    let read = read_with(&file, &Options { strokes, ..Options::default() }).expect("readable");
+    let crate::scene::SurfaceDesc::Triangles(mesh) = &read.scene.meshes[0].geometries[0].surface else {
+        panic!("no triangles")
+    };
+    assert_eq!((mesh.triangles.len(), mesh.positions[0].length()), (3 * 32, 0.5));
+    // All three stand at one place: lines between them have no length.
+    assert_eq!(read.scene.meshes[0].geometries.len(), 1);
+    assert!(!read.report.warnings.iter().any(|w| w.message.contains("not drawn")));
+    let limits = Limits { elements: 90, ..Limits::default() };
+    let error = read_with(&file, &Options { strokes, limits, ..Options::default() }).expect_err("too many");
+    assert!(matches!(error.kind, ErrorKind::Limit(_)), "{error}");
+}

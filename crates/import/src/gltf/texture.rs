@@ -111,6 +111,11 @@ impl<'a> Textures<'a> {
         })
     }
 
+    /// How many images are used.
+    pub(super) fn count(&self) -> usize {
+        self.used.len()
+    }
+
     /// Decodes the images that are used, in parallel. One that cannot be read is replaced, with a warning.
     pub(super) fn decode(self, report: &mut Report) -> Vec<ImageDesc> {
         let names: Vec<String> = self.used.iter().map(|&i| self.name(i)).collect();

@@ -2,6 +2,7 @@
 
 use gltf::json::{Root, mesh::Primitive};
 
+use super::json;
 use super::source::Source;
 use crate::{ImportError, Report};
 
@@ -17,18 +18,8 @@ pub(super) fn names(root: &Root) -> Vec<String> {
 /// If the file has no such variant; the error names those that it has.
 pub(super) fn choose(source: &Source<'_>, wanted: Option<&str>, report: &Report) -> Result<Option<u32>, ImportError> {
     let Some(wanted) = wanted else { return Ok(None) };
-    let names = &report.variants;
-    let number = || wanted.parse().ok().filter(|i| *i < names.len());
-    match names.iter().position(|name| name == wanted).or_else(number) {
-        Some(i) => Ok(Some(i as u32)),
-        None if names.is_empty() => {
-            Err(source.invalid("", format!("there is no variant '{wanted}': the file has none")))
-        }
-        None => {
-            let list: Vec<String> = names.iter().enumerate().map(|(i, name)| format!("{i} '{name}'")).collect();
-            Err(source.invalid("", format!("there is no variant '{wanted}': there are {}", list.join(", "))))
-        }
-    }
+    let names = report.variants.iter().map(String::as_str);
+    json::by_name(source.file, "variant", wanted, names).map(|i| Some(i as u32))
 }
 
 /// The material of a primitive in a variant; its own where the variant does not say.

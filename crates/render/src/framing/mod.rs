@@ -7,6 +7,7 @@
 //! * A **room with one side open** (a stage, a Cornell box) is seen from outside through that side.
 
 mod hull;
+mod motion;
 mod points;
 
 use firsthit_accel::Scene;
@@ -15,6 +16,7 @@ use glam::DVec3;
 
 use crate::Camera;
 use hull::Hull;
+pub use motion::all_poses;
 use points::Points;
 
 /// A camera that was found, and why it is where it is.

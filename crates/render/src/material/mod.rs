@@ -89,12 +89,28 @@ pub(crate) struct Shading<K: Kernel> {
 pub(crate) struct Textures<'a> {
     images: &'a [ImageDesc],
     mips: bool,
-    made: Vec<[Option<Arc<Texture>>; 2]>,
+    made: Made,
 }
+
+/// For each image what was made of it: as data, and as colours.
+pub(crate) type Made = Vec<[Option<Arc<Texture>>; 2]>;
 
 impl<'a> Textures<'a> {
     pub(crate) fn new(images: &'a [ImageDesc], mips: bool) -> Self {
         Self { images, mips, made: vec![[None, None]; images.len()] }
+    }
+
+    /// Takes over what was made of images whose pixels are the very same.
+    pub(crate) fn take_over(&mut self, images: &[ImageDesc], made: &Made) {
+        for (k, (old, made)) in images.iter().zip(made).enumerate() {
+            if self.images.get(k).is_some_and(|new| new.pixels.is_same(&old.pixels)) {
+                self.made[k].clone_from(made);
+            }
+        }
+    }
+
+    pub(crate) fn made(self) -> Made {
+        self.made
     }
 
     fn get(&mut self, reference: Option<&TextureRef>, space: ColorSpace) -> Result<Option<TextureLookup>, StageError> {
