@@ -36,7 +36,6 @@ impl File {
     /// The elements of an accessor, as fractions where it says so.
     fn elements(&self, accessor: &Value) -> Vec<Vec<f64>> {
         let a = &self.json["accessors"][index(accessor)];
-        assert!(a.get("sparse").is_none(), "no sparse accessors here");
         let width = match a["type"].as_str().unwrap() {
             "SCALAR" => 1,
             "VEC2" => 2,
@@ -44,19 +43,48 @@ impl File {
             "VEC4" => 4,
             _ => 16,
         };
-        let size = match a["componentType"].as_u64().unwrap() {
+        let component = a["componentType"].as_u64().unwrap();
+        let normalized = a["normalized"].as_bool().unwrap_or(false);
+        let count = index(&a["count"]);
+        let mut all = match a.get("bufferView") {
+            Some(view) => self.numbers(view, offset(a), count, width, component, normalized),
+            None => vec![vec![0.0; width]; count],
+        };
+        if let Some(sparse) = a.get("sparse") {
+            let part = |key: &str| &sparse[key];
+            let (at, values, n) = (part("indices"), part("values"), index(&sparse["count"]));
+            let at_type = at["componentType"].as_u64().unwrap();
+            let places = self.numbers(&at["bufferView"], offset(at), n, 1, at_type, false);
+            let values = self.numbers(&values["bufferView"], offset(values), n, width, component, normalized);
+            for (place, value) in places.iter().zip(values) {
+                all[place[0] as usize] = value;
+            }
+        }
+        all
+    }
+
+    /// Elements in a buffer view.
+    fn numbers(
+        &self,
+        view: &Value,
+        start: usize,
+        count: usize,
+        width: usize,
+        component: u64,
+        normalized: bool,
+    ) -> Vec<Vec<f64>> {
+        let size = match component {
             5120 | 5121 => 1,
             5122 | 5123 => 2,
             _ => 4,
         };
-        let view = &self.json["bufferViews"][index(&a["bufferView"])];
-        let start = offset(view) + offset(a);
+        let view = &self.json["bufferViews"][index(view)];
+        let start = offset(view) + start;
         let stride = view["byteStride"].as_u64().map_or(width * size, |s| s as usize);
         let buffer = &self.buffers[index(&view["buffer"])];
-        let normalized = a["normalized"].as_bool().unwrap_or(false);
-        let component = |at: usize| {
+        let number = |at: usize| {
             let b = &buffer[at..];
-            let (x, most) = match a["componentType"].as_u64().unwrap() {
+            let (x, most) = match component {
                 5120 => (f64::from(b[0] as i8), 127.0),
                 5121 => (f64::from(b[0]), 255.0),
                 5122 => (f64::from(i16::from_le_bytes([b[0], b[1]])), 32767.0),
@@ -66,9 +94,8 @@ impl File {
             };
             if normalized { (x / most).max(-1.0) } else { x }
         };
-        (0..index(&a["count"]))
-            .map(|i| (0..width).map(|k| component(start + i * stride + k * size)).collect())
-            .collect()
+        let element = |i: usize| (0..width).map(|k| number(start + i * stride + k * size)).collect();
+        (0..count).map(element).collect()
     }
 
     /// The value of a sampler at a time; weights are as many scalars for each key.
