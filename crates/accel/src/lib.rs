@@ -70,7 +70,7 @@ pub use follow::Followed;
 pub use guards::Guards;
 pub use hit::{Hit, HitId, SurfacePoint, TraversalCounts};
 pub use query::{ClosestPoint, Crossings, HitLists};
-pub use region::{VisitedTriangle, Visitor};
+pub use region::{CurveSegment, Part, Separation, SphereHit, View, VisitedTriangle, Visitor};
 pub use saved::SavedTreesError;
 pub use scene::{Scene, SceneStats};
 pub use simd::Level;

@@ -423,6 +423,11 @@ impl Model {
             .chain(corners)
     }
 
+    /// Boxes of the shapes, normalised and perhaps infinite, with their geometries.
+    pub(crate) fn shape_boxes(&self) -> impl Iterator<Item = (u32, Aabb<f64>)> + '_ {
+        self.shapes.iter().map(|s| (s.geometry, s.bounds))
+    }
+
     /// All primitives in the caller's order.
     pub(crate) fn surfaces(&self) -> impl Iterator<Item = (PrimitiveId, Surface<'_>)> + '_ {
         self.places.iter().enumerate().flat_map(move |(g, places)| {

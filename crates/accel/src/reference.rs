@@ -4,9 +4,12 @@
 //! public so that you can do so too.
 
 use core::ops::ControlFlow;
+use std::collections::BTreeMap;
 
 use firsthit_geometry::distance::closest_on_triangle;
 use firsthit_geometry::overlap::Region;
+use firsthit_geometry::sweep::sphere_to_triangle;
+use firsthit_geometry::triangle_pair::{meet, meet_otherwise};
 use firsthit_geometry::{
     Primitive, Ray,
     exact::{ExactRay, Root},
@@ -15,8 +18,8 @@ use firsthit_geometry::{
 use glam::DVec3;
 
 use crate::model::Surface;
-use crate::region::meets;
-use crate::{ClosestPoint, Crossings, Hit, HitId, Scene};
+use crate::region::{meets, separation};
+use crate::{ClosestPoint, Crossings, Hit, HitId, Part, Scene, Separation, SphereHit, VisitedTriangle};
 
 /// All hits in the ray's closed interval, by `t`, then by id, those of the closed triangles
 /// ([`Crossings::Triangles`]). Of a shape that a ray meets more than once, all.
@@ -167,6 +170,64 @@ pub fn nearest_k(scene: &Scene, point: DVec3, count: usize, radius: f64) -> Vec<
 pub fn overlapping(scene: &Scene, region: &impl Region) -> Vec<HitId> {
     let of = |(id, corners)| meets(region, corners).then_some(id);
     if region.is_valid() { triangles(scene).filter_map(of).collect() } else { Vec::new() }
+}
+
+/// The parts that meet a region: see [`Scene::parts_in`].
+#[must_use]
+pub fn parts_in(scene: &Scene, region: &impl Region) -> Vec<Part> {
+    let mut parts: Vec<Part> = overlapping(scene, region).into_iter().map(Part::from).collect();
+    if region.is_valid() {
+        parts.extend(scene.shapes_near(region));
+    }
+    parts.sort_unstable();
+    parts.dedup();
+    parts
+}
+
+/// Which parts the rays meet first, and how many each.
+#[must_use]
+pub fn parts_along(scene: &Scene, rays: &[Ray<f64>]) -> Vec<(Part, u64)> {
+    let mut counts = BTreeMap::new();
+    for hit in rays.iter().filter_map(|ray| closest_hit(scene, ray)) {
+        *counts.entry(Part::from(hit.id)).or_insert(0) += 1;
+    }
+    counts.into_iter().collect()
+}
+
+/// Where a moving sphere first touches a triangle, each tried.
+#[must_use]
+pub fn cast_sphere(scene: &Scene, ray: &Ray<f64>, radius: f64) -> Option<SphereHit> {
+    let touches = triangles(scene).filter_map(|(id, corners)| {
+        let touch = sphere_to_triangle(ray, radius, corners)?;
+        Some(SphereHit { id, t: touch.t, point: touch.point, center: ray.at(touch.t) })
+    });
+    // The first of those that come at once.
+    touches.min_by(|a, b| a.t.total_cmp(&b.t).then(a.id.cmp(&b.id)))
+}
+
+/// All pairs of triangles that meet, by id: each pair tried.
+#[must_use]
+pub fn intersecting_pairs(scene: &Scene, other: &Scene) -> Vec<[HitId; 2]> {
+    let of = |(a, x)| triangles(other).filter_map(move |(b, y)| meet(x, y).then_some([a, b]));
+    triangles(scene).flat_map(of).collect()
+}
+
+/// All pairs of triangles that meet otherwise than in common corners and edges, by id: each pair tried.
+#[must_use]
+pub fn self_intersections(scene: &Scene) -> Vec<[HitId; 2]> {
+    let of = |(a, x)| {
+        let later = triangles(scene).filter(move |(b, _)| a < *b);
+        later.filter_map(move |(b, y)| meet_otherwise(x, y).then_some([a, b]))
+    };
+    triangles(scene).flat_map(of).collect()
+}
+
+/// The nearest points of two scenes: each pair of triangles tried.
+#[must_use]
+pub fn distance_between(scene: &Scene, other: &Scene) -> Option<Separation> {
+    let seen = |(id, corners)| VisitedTriangle { id, corners, inside: false };
+    let of = |a| triangles(other).map(move |b| separation(&seen(a), &seen(b)));
+    triangles(scene).flat_map(of).min_by(|a, b| a.distance.total_cmp(&b.distance).then(a.ids.cmp(&b.ids)))
 }
 
 /// How often the triangles wind around a point: the sum of their solid angles as seen from there, over 4 pi.

@@ -28,8 +28,10 @@ mod ray;
 mod real;
 pub mod shapes;
 pub mod slab;
+pub mod sweep;
 pub mod transform;
 pub mod triangle;
+pub mod triangle_pair;
 
 pub use aabb::Aabb;
 pub use precision::Precision;

@@ -3,8 +3,11 @@
 //! Everything here goes through one way of walking the trees ([`cursor`]), in `f64` and in the world, so that answers do not
 //! depend on the layout, the tier or the instructions.
 
+mod cast;
 mod cursor;
 mod overlap;
+mod pairs;
+mod visible;
 
 use core::ops::ControlFlow;
 
@@ -16,7 +19,11 @@ use crate::scene::Inner;
 use crate::{HitId, Scene};
 use cursor::Cursor;
 
+pub use cast::SphereHit;
 pub(crate) use overlap::meets;
+pub(crate) use pairs::separation;
+pub use pairs::{CurveSegment, Separation};
+pub use visible::{Part, View};
 
 /// A triangle as a [`Visitor`] sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]

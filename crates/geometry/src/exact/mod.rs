@@ -5,10 +5,12 @@
 
 pub(crate) mod dyadic;
 pub(crate) mod number;
+mod orient;
 pub(crate) mod quadratic;
 mod root;
 mod triangle;
 mod twofold;
 
+pub use orient::{orient2d, orient3d};
 pub use root::Root;
 pub use triangle::{ExactHit, ExactRay};
