@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use firsthit_accel::Hit;
+use firsthit_accel::{ClosestPoint, Hit};
 use numpy::{Element, PyArray1, PyArrayMethods};
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
@@ -127,6 +127,22 @@ impl<'a> Slots<'a> {
     }
 }
 
+/// Nearest points: `t` is the distance.
+impl Slots<'_> {
+    #[inline(always)]
+    pub(crate) fn set_nearest(&mut self, i: usize, near: Option<&ClosestPoint>, place: &mut [f64; 3]) {
+        *place = near.map_or([f64::NAN; 3], |near| near.point.to_array());
+        let hit = near.map(|near| Hit {
+            id: near.id,
+            t: near.distance,
+            u: near.u,
+            v: near.v,
+            normal_direction: near.normal_direction,
+        });
+        self.set(i, hit.as_ref());
+    }
+}
+
 /// The fields that all answers have.
 struct Fields {
     shape: Vec<usize>,
@@ -231,6 +247,79 @@ impl Hits {
 
     fn __repr__(&self) -> String {
         format!("<firsthit.Hits of shape {:?}>", self.0.shape)
+    }
+}
+
+/// Nearest points of the surface; see `_firsthit.pyi`.
+#[pyclass(frozen, module = "firsthit")]
+pub struct ClosestPoints {
+    fields: Fields,
+    points: Field<[f64; 3]>,
+}
+
+impl ClosestPoints {
+    pub(crate) fn new(shape: Vec<usize>, found: Found, points: Vec<[f64; 3]>) -> Self {
+        Self { fields: Fields::new(shape, found), points: Field::new(points) }
+    }
+}
+
+#[pymethods]
+impl ClosestPoints {
+    #[getter]
+    fn shape(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        Ok(pyo3::types::PyTuple::new(py, &self.fields.shape)?.into_any().unbind())
+    }
+
+    #[getter]
+    fn points(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.points.get(py, &self.fields.shape, Some(3), Vec::into_flattened)
+    }
+
+    #[getter]
+    fn distance(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.fields.get(py, "t_hit")
+    }
+
+    #[getter]
+    fn instance_ids(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.fields.get(py, "instance_ids")
+    }
+
+    #[getter]
+    fn geometry_ids(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.fields.get(py, "geometry_ids")
+    }
+
+    #[getter]
+    fn primitive_ids(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.fields.get(py, "primitive_ids")
+    }
+
+    #[getter]
+    fn primitive_uvs(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.fields.get(py, "primitive_uvs")
+    }
+
+    #[getter]
+    fn primitive_normals(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.fields.get(py, "primitive_normals")
+    }
+
+    fn __getitem__(&self, py: Python<'_>, key: &str) -> PyResult<Py<PyAny>> {
+        match key {
+            "points" => self.points(py),
+            "distance" => self.distance(py),
+            "t_hit" => Err(PyKeyError::new_err("t_hit")),
+            other => self.fields.get(py, other),
+        }
+    }
+
+    fn keys<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        PyList::new(py, ["points", "distance"].iter().chain(&KEYS[1..]))
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<firsthit.ClosestPoints of shape {:?}>", self.fields.shape)
     }
 }
 

@@ -7,6 +7,7 @@ mod arrays;
 mod error;
 mod hits;
 mod mesh;
+mod points;
 mod pool;
 mod rays;
 mod render;
@@ -18,7 +19,7 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _firsthit {
     #[pymodule_export]
-    use super::hits::{HitLists, Hits};
+    use super::hits::{ClosestPoints, HitLists, Hits};
     #[pymodule_export]
     use super::render::render;
     #[pymodule_export]

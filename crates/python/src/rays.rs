@@ -25,8 +25,8 @@ enum Places<'py> {
     Apart(Floats<'py>, Floats<'py>),
 }
 
-/// An end of the interval.
-enum End<'py> {
+/// A number of each ray or point: an end of the interval, a radius.
+pub(crate) enum End<'py> {
     Same(f64),
     Each(Floats<'py>),
     /// A column of the rays.
@@ -42,9 +42,9 @@ pub(crate) struct View<'a> {
     t_max: Part<'a>,
 }
 
-/// Some numbers of each ray.
+/// Some numbers of each ray or point.
 #[derive(Clone, Copy)]
-struct Part<'a> {
+pub(crate) struct Part<'a> {
     numbers: Numbers<'a>,
     start: usize,
     /// 0 where all rays have the same.
@@ -53,12 +53,12 @@ struct Part<'a> {
 
 impl Part<'_> {
     #[inline(always)]
-    fn number(&self, ray: usize, k: usize) -> f64 {
+    pub(crate) fn number(&self, ray: usize, k: usize) -> f64 {
         self.numbers.get(self.start + ray * self.step + k)
     }
 
     #[inline(always)]
-    fn vector(&self, ray: usize) -> DVec3 {
+    pub(crate) fn vector(&self, ray: usize) -> DVec3 {
         DVec3::new(self.number(ray, 0), self.number(ray, 1), self.number(ray, 2))
     }
 }
@@ -142,7 +142,7 @@ impl<'py> Rays<'py> {
 
 impl<'py> End<'py> {
     /// `rays`: the part that rays of all their numbers begin with.
-    fn part<'a>(&'a self, rays: Part<'a>) -> Part<'a> {
+    pub(crate) fn part<'a>(&'a self, rays: Part<'a>) -> Part<'a> {
         match self {
             Self::Same(t) => Part { numbers: Numbers::Wide(std::slice::from_ref(t)), start: 0, step: 0 },
             Self::Each(floats) => Part { numbers: floats.numbers(), start: 0, step: 1 },
@@ -150,7 +150,7 @@ impl<'py> End<'py> {
         }
     }
 
-    fn new(given: Option<&Bound<'py, PyAny>>, default: f64, shape: &[usize]) -> PyResult<Self> {
+    pub(crate) fn new(given: Option<&Bound<'py, PyAny>>, default: f64, shape: &[usize]) -> PyResult<Self> {
         let Some(given) = given else { return Ok(Self::Same(default)) };
         if let Ok(number) = given.cast::<PyFloat>() {
             return Ok(Self::Same(number.extract()?));
@@ -160,6 +160,30 @@ impl<'py> End<'py> {
             return Ok(Self::Same(floats.numbers().get(0)));
         }
         if floats.shape() == shape { Ok(Self::Each(floats)) } else { Floats::repeated(given, shape).map(Self::Each) }
+    }
+}
+
+/// Points of shape `(..., 3)`.
+pub(crate) struct Points<'py> {
+    /// The shape of the answers.
+    pub(crate) shape: Vec<usize>,
+    /// How many points there are.
+    pub(crate) count: usize,
+    floats: Floats<'py>,
+}
+
+impl<'py> Points<'py> {
+    pub(crate) fn new(points: &Bound<'py, PyAny>) -> PyResult<Self> {
+        let floats = Floats::new(points)?;
+        match split(floats.shape()) {
+            Some((3, lead)) => Ok(Self { shape: lead.to_vec(), count: lead.iter().product(), floats }),
+            _ => Err(error::value(format_args!("points: shape {:?}; (..., 3) is needed", floats.shape()))),
+        }
+    }
+
+    /// The points, to be read.
+    pub(crate) fn part(&self) -> Part<'_> {
+        Part { numbers: self.floats.numbers(), start: 0, step: 3 }
     }
 }
 

@@ -1,9 +1,9 @@
 //! Scenes and what they are asked.
 
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
-use firsthit_accel::{BuildOptions, BuildQuality, Crossings, SceneBuilder};
+use firsthit_accel::{BuildOptions, BuildQuality, Crossings, SceneBuilder, SignMethod, Solid};
 use firsthit_geometry::{Precision, Ray};
 use firsthit_import::{Imported, Options, UpAxis};
 use glam::{DVec3, Vec3};
@@ -14,15 +14,16 @@ use rayon::prelude::*;
 
 use crate::arrays::triangles;
 use crate::error;
-use crate::hits::{Found, HitLists, Hits, Slots};
+use crate::hits::{ClosestPoints, Found, HitLists, Hits, Slots};
 use crate::mesh::Mesh;
+use crate::points;
 use crate::pool::pool;
-use crate::rays::{Rays, View};
+use crate::rays::Rays;
 
-/// Rays that one task takes.
-const CHUNK: usize = 1024;
+/// Rays or points that one task takes.
+pub(crate) const CHUNK: usize = 1024;
 
-/// So few rays are answered at once, without letting Python go.
+/// So few are answered at once, without letting Python go.
 const FEW: usize = 16;
 
 /// Where a scene comes from: what it is pickled and rendered by.
@@ -38,6 +39,8 @@ pub struct Scene {
     scene: firsthit_accel::Scene,
     pub(crate) source: Source,
     warnings: Vec<String>,
+    /// By how inside is told from outside; made when it is first asked about.
+    pub(crate) solids: Mutex<Vec<(Option<SignMethod>, Arc<Solid>)>>,
 }
 
 /// How trees are built, by name.
@@ -92,7 +95,7 @@ impl Scene {
     fn of_mesh(py: Python<'_>, mesh: Mesh, options: BuildOptions, threads: usize) -> PyResult<Self> {
         let pool = pool(threads)?;
         let scene = py.detach(|| pool.install(|| mesh.build(options))).map_err(error::value)?;
-        Ok(Self { scene, source: Source::Arrays(Arc::new(mesh)), warnings: Vec::new() })
+        Ok(Self { scene, source: Source::Arrays(Arc::new(mesh)), warnings: Vec::new(), solids: Mutex::default() })
     }
 
     fn open(py: Python<'_>, source: Source, options: BuildOptions, threads: usize) -> PyResult<Self> {
@@ -104,65 +107,59 @@ impl Scene {
                 PyResult::Ok((scene, warnings))
             })
         })?;
-        Ok(Self { scene, source, warnings })
+        Ok(Self { scene, source, warnings, solids: Mutex::default() })
     }
 
-    /// One value for each ray, from a function of many rays.
-    fn each<'py, T: Element + Copy + Default + Send>(
-        &self,
-        py: Python<'py>,
-        rays: &Rays<'_>,
-        threads: usize,
-        answer: impl Fn(&[Ray<f64>], &mut [T]) + Sync,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        let mut answers = vec![T::default(); rays.count];
-        let parts: Vec<&mut [T]> = answers.chunks_mut(CHUNK).collect();
-        in_chunks(py, rays, threads, parts, |rays, part| answer(rays, part))?;
-        Ok(PyArray1::from_vec(py, answers).reshape(rays.shape.clone())?.into_any())
+    pub(crate) fn trees(&self) -> &firsthit_accel::Scene {
+        &self.scene
     }
 }
 
-/// Gives each chunk of the rays its part of the answers, on threads unless there are few.
-fn in_chunks<P: Send>(
+/// One value for each of some rays or points, from a function of many.
+pub(crate) fn each<'py, Q, T: Element + Copy + Default + Send>(
+    py: Python<'py>,
+    shape: &[usize],
+    item: impl Fn(usize) -> Q + Sync,
+    threads: usize,
+    answer: impl Fn(&[Q], &mut [T]) + Sync,
+) -> PyResult<Bound<'py, PyAny>> {
+    let count = shape.iter().product();
+    let mut answers = vec![T::default(); count];
+    let parts: Vec<&mut [T]> = answers.chunks_mut(CHUNK).collect();
+    in_chunks(py, (count, item), threads, parts, |items, part| answer(items, part))?;
+    Ok(PyArray1::from_vec(py, answers).reshape(shape.to_vec())?.into_any())
+}
+
+/// Gives each chunk of so many rays or points its part of the answers, on threads unless there are few.
+pub(crate) fn in_chunks<Q, P: Send>(
     py: Python<'_>,
-    rays: &Rays<'_>,
+    (count, item): (usize, impl Fn(usize) -> Q + Sync),
     threads: usize,
     parts: Vec<P>,
-    answer: impl Fn(&[Ray<f64>], P) + Sync,
+    answer: impl Fn(&[Q], P) + Sync,
 ) -> PyResult<()> {
-    let view = rays.view();
-    let count = rays.count;
-    let fill = |buffer: &mut Vec<Ray<f64>>, chunk: usize, view: &View<'_>| {
+    let one = |buffer: &mut Vec<Q>, chunk: usize, part: P| {
         buffer.clear();
-        buffer.extend((chunk * CHUNK..count.min((chunk + 1) * CHUNK)).map(|i| view.ray(i)));
+        buffer.extend((chunk * CHUNK..count.min((chunk + 1) * CHUNK)).map(&item));
+        answer(buffer, part);
+    };
+    let in_turn = |parts: Vec<P>| {
+        let mut buffer = Vec::with_capacity(CHUNK.min(count));
+        parts.into_iter().enumerate().for_each(|(chunk, part)| one(&mut buffer, chunk, part));
     };
     if count <= FEW {
-        let mut buffer = Vec::new();
-        for (chunk, part) in parts.into_iter().enumerate() {
-            fill(&mut buffer, chunk, &view);
-            answer(&buffer, part);
-        }
-        return Ok(());
-    }
-    if threads == 1 || count <= CHUNK {
+        in_turn(parts);
+    } else if threads == 1 || count <= CHUNK {
+        py.detach(|| in_turn(parts));
+    } else {
+        let pool = pool(threads)?;
         py.detach(|| {
-            let mut buffer = Vec::with_capacity(CHUNK.min(count));
-            for (chunk, part) in parts.into_iter().enumerate() {
-                fill(&mut buffer, chunk, &view);
-                answer(&buffer, part);
-            }
-        });
-        return Ok(());
-    }
-    let pool = pool(threads)?;
-    py.detach(|| {
-        pool.install(|| {
-            parts.into_par_iter().enumerate().for_each_init(Vec::new, |buffer, (chunk, part)| {
-                fill(buffer, chunk, &view);
-                answer(buffer, part);
+            pool.install(|| {
+                let parts = parts.into_par_iter().enumerate();
+                parts.for_each_init(Vec::new, |buffer, (chunk, part)| one(buffer, chunk, part));
             });
         });
-    });
+    }
     Ok(())
 }
 
@@ -202,9 +199,10 @@ impl Scene {
         threads: usize,
     ) -> PyResult<Hits> {
         let rays = Rays::new(rays, directions, t_min, t_max)?;
+        let view = rays.view();
         let mut found = Found::zeroed(rays.count);
         let parts = found.slots().chunks(CHUNK);
-        in_chunks(py, &rays, threads, parts, |rays, mut part: Slots<'_>| {
+        in_chunks(py, (rays.count, |i| view.ray(i)), threads, parts, |rays, mut part: Slots<'_>| {
             if let [ray] = rays {
                 return part.set(0, self.scene.closest_hit(ray).as_ref());
             }
@@ -246,7 +244,8 @@ impl Scene {
         threads: usize,
     ) -> PyResult<Bound<'py, PyAny>> {
         let rays = Rays::new(rays, directions, t_min, t_max)?;
-        self.each(py, &rays, threads, |rays, hits| self.scene.any_hits(rays, hits))
+        let view = rays.view();
+        each(py, &rays.shape, |i| view.ray(i), threads, |rays, hits| self.scene.any_hits(rays, hits))
     }
 
     #[pyo3(signature = (rays, directions=None, *, t_min=None, t_max=None, crossings="triangles", threads=0))]
@@ -262,7 +261,9 @@ impl Scene {
     ) -> PyResult<Bound<'py, PyAny>> {
         let crossings = self::crossings(crossings)?;
         let rays = Rays::new(rays, directions, t_min, t_max)?;
-        self.each(py, &rays, threads, |rays, counts| self.scene.count_hits_each(rays, crossings, counts))
+        let view = rays.view();
+        let count = |rays: &[Ray<f64>], counts: &mut [u32]| self.scene.count_hits_each(rays, crossings, counts);
+        each(py, &rays.shape, |i| view.ray(i), threads, count)
     }
 
     #[pyo3(signature = (rays, directions=None, *, t_min=None, t_max=None, crossings="triangles", threads=0))]
@@ -280,7 +281,10 @@ impl Scene {
         let rays = Rays::new(rays, directions, t_min, t_max)?;
         let mut lists = vec![firsthit_accel::HitLists::default(); rays.count.div_ceil(CHUNK)];
         let parts: Vec<_> = lists.iter_mut().collect();
-        in_chunks(py, &rays, threads, parts, |rays, list| *list = self.scene.all_hits_each(rays, crossings))?;
+        let view = rays.view();
+        in_chunks(py, (rays.count, |i| view.ray(i)), threads, parts, |rays, list| {
+            *list = self.scene.all_hits_each(rays, crossings);
+        })?;
         let (splits, found) = py.detach(|| {
             let total = lists.iter().map(|l| l.hits().len()).sum();
             let mut splits = Vec::with_capacity(rays.count + 1);
@@ -298,6 +302,64 @@ impl Scene {
             (splits, found)
         });
         Ok(HitLists::new(rays.shape, splits, found))
+    }
+
+    #[pyo3(signature = (points, *, radius=None, threads=0))]
+    fn closest_point(
+        &self,
+        py: Python<'_>,
+        points: &Bound<'_, PyAny>,
+        radius: Option<&Bound<'_, PyAny>>,
+        threads: usize,
+    ) -> PyResult<ClosestPoints> {
+        points::closest(self, py, points, radius, threads)
+    }
+
+    #[pyo3(signature = (points, *, threads=0))]
+    fn distance<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+        threads: usize,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        points::distance(self, py, points, threads)
+    }
+
+    #[pyo3(signature = (points, *, sign="auto", threads=0))]
+    fn signed_distance<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+        sign: &str,
+        threads: usize,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        points::signed_distance(self, py, points, sign, threads)
+    }
+
+    #[pyo3(signature = (points, *, sign="auto", threads=0))]
+    fn contains<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+        sign: &str,
+        threads: usize,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        points::contains(self, py, points, sign, threads)
+    }
+
+    #[pyo3(signature = (points, *, sign="auto", threads=0))]
+    fn winding_number<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+        sign: &str,
+        threads: usize,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        points::winding_number(self, py, points, sign, threads)
+    }
+
+    fn is_watertight(&self, py: Python<'_>) -> PyResult<bool> {
+        Ok(points::solid(self, py, "auto", 0)?.is_watertight())
     }
 
     #[getter]

@@ -9,11 +9,12 @@
 array([ True, False])
 """
 
-from ._firsthit import INVALID_ID, HitLists, Hits, Scene, __version__, load, render
+from ._firsthit import INVALID_ID, ClosestPoints, HitLists, Hits, Scene, __version__, load, render
 from ._trimesh import RayMeshIntersector, trimesh_ray
 
 __all__ = [
     "INVALID_ID",
+    "ClosestPoints",
     "HitLists",
     "Hits",
     "RayMeshIntersector",

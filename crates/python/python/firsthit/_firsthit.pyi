@@ -14,6 +14,7 @@ INVALID_ID: int
 
 _Precision = Literal["fast", "robust", "double", "exact"]
 _Quality = Literal["fast", "balanced", "high"]
+_Sign = Literal["auto", "winding", "fast_winding", "parity", "pseudonormal", "exact"]
 _Crossings = Literal["triangles", "surfaces"]
 
 @final
@@ -88,6 +89,37 @@ class HitLists:
     def __getitem__(self, key: str, /) -> NDArray[Any]: ...
     def __len__(self) -> int: ...
 
+@final
+class ClosestPoints:
+    """The nearest point of the surface for each point. It also indexes like a dictionary: ``nearest["points"]``."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The leading shape of the points."""
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """The nearest points, shape ``(..., 3)``; NaN where there is none."""
+    @property
+    def distance(self) -> NDArray[np.float64]:
+        """How far they are; infinity where there is none."""
+    @property
+    def instance_ids(self) -> NDArray[np.uint32]:
+        """Index of the instance, or `INVALID_ID`."""
+    @property
+    def geometry_ids(self) -> NDArray[np.uint32]:
+        """Index of the geometry in its mesh, or `INVALID_ID`."""
+    @property
+    def primitive_ids(self) -> NDArray[np.uint32]:
+        """Index of the triangle in its geometry, or `INVALID_ID`."""
+    @property
+    def primitive_uvs(self) -> NDArray[np.float32]:
+        """Weights of the triangle's second and third vertex, shape ``(..., 2)``."""
+    @property
+    def primitive_normals(self) -> NDArray[np.float64]:
+        """Unit normals of the triangles by their winding, shape ``(..., 3)``."""
+    def keys(self) -> list[str]: ...
+    def __getitem__(self, key: str, /) -> NDArray[Any]: ...
+
 class Scene:
     """Triangles and instances with their trees. Built once, then only asked, from any number of threads.
 
@@ -153,7 +185,8 @@ class Scene:
         *,
         t_min: ArrayLike | None = None,
         t_max: ArrayLike | None = None,
-        crossings: _Crossings = "triangles",
+        crossings: _Sign = Literal["auto", "winding", "fast_winding", "parity", "pseudonormal", "exact"]
+_Crossings = "triangles",
         threads: int = 0,
     ) -> NDArray[np.uint32]:
         """How often each ray meets something.
@@ -168,10 +201,37 @@ class Scene:
         *,
         t_min: ArrayLike | None = None,
         t_max: ArrayLike | None = None,
-        crossings: _Crossings = "triangles",
+        crossings: _Sign = Literal["auto", "winding", "fast_winding", "parity", "pseudonormal", "exact"]
+_Crossings = "triangles",
         threads: int = 0,
     ) -> HitLists:
         """Everything that each ray meets; for ``crossings`` see `count_hits`."""
+    def closest_point(
+        self, points: ArrayLike, *, radius: ArrayLike | None = None, threads: int = 0
+    ) -> ClosestPoints:
+        """The nearest point of the triangles, for points of shape ``(..., 3)``; with a radius, one for all or one for
+        each, only if it is not farther."""
+    def distance(self, points: ArrayLike, *, threads: int = 0) -> NDArray[np.float64]:
+        """How far the triangles are; infinity if there are none, NaN for a point that is not finite."""
+    def signed_distance(
+        self, points: ArrayLike, *, sign: _Sign = "auto", threads: int = 0
+    ) -> NDArray[np.float64]:
+        """`distance`, negative inside.
+
+        ``sign`` is how inside is told from outside: by the winding number (which holes do not upset; ``"fast_winding"``
+        sums it over clusters of triangles), by the parity of the crossings of a ray (``"exact"`` decides them exactly),
+        or by the normals at the nearest point. ``"auto"`` is winding, for closed meshes of mixed orientation parity.
+        The first call takes a look at the whole mesh.
+        """
+    def contains(self, points: ArrayLike, *, sign: _Sign = "auto", threads: int = 0) -> NDArray[np.bool_]:
+        """Whether points are inside; for ``sign`` see `signed_distance`. On the surface it is either."""
+    def winding_number(
+        self, points: ArrayLike, *, sign: _Sign = "auto", threads: int = 0
+    ) -> NDArray[np.float64]:
+        """How often the surface winds around points: 1 inside of a closed mesh, 0 outside, a fraction where it is
+        open. Only ``"fast_winding"`` is an approximation."""
+    def is_watertight(self) -> bool:
+        """Whether the surface has no holes: each edge has an even number of triangles."""
     @property
     def bounds(self) -> NDArray[np.float64]:
         """Lower and upper corner of a box around everything, shape ``(2, 3)``."""

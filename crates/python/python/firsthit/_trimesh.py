@@ -9,9 +9,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from ._firsthit import INVALID_ID, Scene
 
-# A direction that lies along no edge or face that a person would model.
-_DIRECTION = (0.5137, 0.6791, 0.5243)
-
 
 class RayMeshIntersector:
     """Ray queries with the names, arguments and answers of trimesh.
@@ -77,9 +74,8 @@ class RayMeshIntersector:
         return self.scene.any_hit(*_rays(ray_origins, ray_directions))
 
     def contains_points(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """Whether each point is inside a closed mesh: whether a ray from there leaves it an odd number of times."""
-        points = np.asarray(points, dtype=np.float64).reshape(-1, 3)
-        return self.scene.count_hits(points, _DIRECTION, crossings="surfaces") % 2 == 1
+        """Whether each point is inside: by the winding number, which holes do not upset."""
+        return self.scene.contains(np.asarray(points, dtype=np.float64).reshape(-1, 3))
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_built": None}
