@@ -55,6 +55,7 @@ pub use firsthit_render as render;
 pub use glam;
 
 pub use firsthit_accel::{
-    BuildOptions, ClosestPoint, Crossings, Geometry, Hit, HitId, Scene, SceneBuilder, SignMethod, Solid, SurfacePoint,
+    BuildOptions, ClosestPoint, Crossings, CurveSegment, Geometry, Hit, HitId, Part, Scene, SceneBuilder, Separation,
+    SignMethod, Solid, SphereHit, SurfacePoint, View, VisitedTriangle, Visitor,
 };
 pub use firsthit_geometry::{Aabb, Precision, Ray, Shape};

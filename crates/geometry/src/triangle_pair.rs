@@ -39,7 +39,7 @@ pub fn meet(first: Triangle, second: Triangle) -> bool {
 #[must_use]
 pub fn meet_otherwise(first: Triangle, second: Triangle) -> bool {
     let (Some(one), Some(two)) = (Flat::new(first), Flat::new(second)) else { return false };
-    let apart = |t: Triangle, other: Triangle| -> Vec3s { t.map(|p| (!other.contains(&p)).then_some(p)) };
+    let apart = |t: Triangle, other: Triangle| -> Alone { t.map(|p| (!other.contains(&p)).then_some(p)) };
     let alone = (apart(first, second), apart(second, first));
     match (alone.0.iter().flatten().count(), alone.1.iter().flatten().count()) {
         (0, 0) => true,
@@ -55,7 +55,7 @@ pub fn meet_otherwise(first: Triangle, second: Triangle) -> bool {
         }
         (2, 2) => {
             // A common corner: anything else in common reaches an edge opposite to it.
-            let opposite = |alone: Vec3s| -> Option<Segment> {
+            let opposite = |alone: Alone| -> Option<Segment> {
                 let mut points = alone.into_iter().flatten();
                 Some([points.next()?, points.next()?])
             };
@@ -65,7 +65,8 @@ pub fn meet_otherwise(first: Triangle, second: Triangle) -> bool {
     }
 }
 
-type Vec3s = [Option<DVec3>; 3];
+/// The corners that another triangle has not.
+type Alone = [Option<DVec3>; 3];
 
 /// The segment that two triangles have in common, or the point twice, rounded. `None` if they do not meet, and if they lie in
 /// one plane.
