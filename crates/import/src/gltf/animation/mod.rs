@@ -98,10 +98,11 @@ pub(super) fn pose(
 ) -> Result<Root, ImportError> {
     let mut root = source.root.clone();
     let mut touched = BTreeSet::new();
+    let mut read = 0;
     for number in choose(source.file, play, report)? {
         let place = format!("/animations/{number}");
         let json: JsonAnimation = json::typed(source.file, &place, &animations[number])?;
-        let mut player = Player { source, place, report, pointers: BTreeMap::new(), read: 0 };
+        let mut player = Player { source, place, report, pointers: BTreeMap::new(), read: &mut read };
         for (i, channel) in json.channels.iter().enumerate() {
             let Some((pointer, property)) = player.target(i, channel)? else { continue };
             let Some(sampler) = json.samplers.get(channel.sampler) else {
@@ -129,8 +130,8 @@ struct Player<'a> {
     report: &'a mut Report,
     /// What was changed by now, and by which channel.
     pointers: BTreeMap<String, usize>,
-    /// How many keys were read, those of shared samplers each time.
-    read: u64,
+    /// How many keys were read by all animations, those of shared samplers each time.
+    read: &'a mut u64,
 }
 
 impl Player<'_> {
@@ -194,8 +195,8 @@ impl Player<'_> {
         }
 
         let output = accessor(json.output, "output")?;
-        self.read = self.read.saturating_add((input.count + output.count) as u64);
-        if self.read > source.limits.elements {
+        *self.read = self.read.saturating_add((input.count + output.count) as u64);
+        if *self.read > source.limits.elements {
             let cause = "channels share so many keys that reading them would take too long";
             return Err(source.at(place("output"), ErrorKind::Limit(cause.into())));
         }

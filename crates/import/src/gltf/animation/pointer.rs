@@ -18,7 +18,8 @@ pub enum Kind {
 /// A property that animations can change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Property {
-    /// Where it is in the file: `{}` stands for a number, `{texture}` for the way to any texture of a material.
+    /// Where it is in the file: `{}` stands for a number, `{texture}` for the way to any texture of a material or of an
+    /// extension of it.
     pub path: &'static str,
     /// What it is.
     pub kind: Kind,
@@ -85,28 +86,37 @@ pub const PROPERTIES: &[Property] = &[
     numbers("/materials/{}/{texture}/extensions/KHR_texture_transform/scale", 2),
 ];
 
+/// No property has more segments, the empty one before the first slash included.
+const MOST_SEGMENTS: usize = 9;
+
 /// The property that a pointer names, if it is one that can be changed.
 pub(super) fn find(pointer: &str) -> Option<&'static Property> {
-    PROPERTIES.iter().find(|p| matches(&segments(p.path), &segments(pointer)))
-}
-
-fn segments(path: &str) -> Vec<&str> {
-    path.split('/').collect()
+    // A file may write millions of segments.
+    let path: Vec<&str> = pointer.split('/').take(MOST_SEGMENTS + 1).collect();
+    let fits = |p: &&Property| matches(&p.path.split('/').collect::<Vec<_>>(), &path);
+    PROPERTIES.iter().find(fits).filter(|_| path.len() <= MOST_SEGMENTS)
 }
 
 fn matches(pattern: &[&str], path: &[&str]) -> bool {
     match (pattern.split_first(), path.split_first()) {
         (None, None) => true,
-        // One segment or more, of which the last names a texture.
-        (Some((&"{texture}", pattern)), Some(_)) => {
-            (0..path.len()).any(|k| path[k].ends_with("Texture") && matches(pattern, &path[k + 1..]))
-        }
+        (Some((&"{texture}", pattern)), Some(_)) => after_texture(path).is_some_and(|rest| matches(pattern, rest)),
         (Some((expected, pattern)), Some((found, path))) => {
             let fits = if *expected == "{}" { index(found).is_some() } else { expected == found };
             fits && matches(pattern, path)
         }
         _ => false,
     }
+}
+
+/// What follows the way to a texture, which begins in the material or in one of its extensions.
+fn after_texture<'a, 'b>(path: &'a [&'b str]) -> Option<&'a [&'b str]> {
+    let path = match path {
+        ["pbrMetallicRoughness", rest @ ..] => rest,
+        ["extensions", name, rest @ ..] if name.starts_with("KHR_materials_") => rest,
+        _ => path,
+    };
+    path.split_first().filter(|(name, _)| name.ends_with("Texture")).map(|(_, rest)| rest)
 }
 
 /// A number of an element, as pointers write it.
@@ -120,8 +130,12 @@ const MEANINGLESS_ALONE: [&str; 8] =
     ["perspective", "orthographic", "spot", "lights", "nodes", "meshes", "cameras", "materials"];
 
 /// Puts a value in the place of another one, or where the default held. What a file may leave out is made, but for
-/// textures, lenses, cones and elements of lists, which mean nothing by themselves. `false`: there is no such place.
+/// textures, lenses, cones and elements of lists, which mean nothing by themselves. `false`: there is no such place, and
+/// nothing is changed.
 pub(super) fn write(json: &mut Value, pointer: &str, new: Value) -> bool {
+    if !can_write(json, pointer) {
+        return false;
+    }
     let mut place = json;
     for segment in pointer.split('/').skip(1) {
         if place.is_null() {
@@ -133,17 +147,32 @@ pub(super) fn write(json: &mut Value, pointer: &str, new: Value) -> bool {
                 Some(element) => element,
                 None => return false,
             },
-            Value::Object(object) => {
-                let alone = segment.ends_with("Texture") || MEANINGLESS_ALONE.contains(&segment);
-                if alone && !object.contains_key(segment) {
-                    return false;
-                }
-                object.entry(segment).or_insert(Value::Null)
-            }
+            Value::Object(object) => object.entry(segment).or_insert(Value::Null),
             _ => return false,
         };
     }
     *place = new;
+    true
+}
+
+/// Whether there is such a place, or what it lacks may be made.
+fn can_write(json: &Value, pointer: &str) -> bool {
+    let mut place = Some(json);
+    for segment in pointer.split('/').skip(1) {
+        place = match place {
+            Some(Value::Array(list)) => match index(segment).and_then(|i| list.get(i)) {
+                Some(element) => Some(element),
+                None => return false,
+            },
+            Some(Value::Object(object)) => object.get(segment),
+            Some(Value::Null) | None => None,
+            Some(_) => return false,
+        };
+        let alone = segment.ends_with("Texture") || MEANINGLESS_ALONE.contains(&segment);
+        if alone && place.is_none_or(Value::is_null) {
+            return false;
+        }
+    }
     true
 }
 
@@ -169,11 +198,22 @@ mod tests {
             assert_eq!(find(none), None, "{none}");
         }
         assert_eq!(find("/materials/5/normalTexture/offset"), None);
+        let long =
+            format!("/materials/0/{}baseColorTexture/extensions/KHR_texture_transform/offset", "a/".repeat(400_000));
+        for none in [long.as_str(), "/materials/0/a/normalTexture/extensions/KHR_texture_transform/offset"] {
+            assert_eq!(find(none), None);
+        }
+        let longest = PROPERTIES.iter().map(|p| p.path.replace("{texture}", "extensions/X/Y").split('/').count()).max();
+        assert_eq!(longest, Some(MOST_SEGMENTS));
     }
 
     #[test]
     fn values_are_put_where_they_belong() {
         let mut file = json!({"materials": [{"normalTexture": {"index": 0}}], "cameras": [{"perspective": {}}]});
+        let before = file.clone();
+        assert!(!write(&mut file, &format!("/materials/0/{}normalTexture/scale", "a/".repeat(100_000)), json!(1.0)));
+        assert!(!write(&mut file, "/materials/0/extensions/KHR_materials_sheen/sheenColorTexture/x", json!(1.0)));
+        assert_eq!(file, before, "what fails changes nothing");
         let mut put = |pointer: &str| write(&mut file, pointer, json!([1.0, 2.0]));
         assert!(put("/materials/0/normalTexture/extensions/KHR_texture_transform/offset"));
         assert!(put("/materials/0/pbrMetallicRoughness/baseColorFactor"));

@@ -5,7 +5,7 @@ use std::fs;
 use serde_json::{Value, json};
 
 use crate::scene::{LightKind, MaterialModel, Projection, SurfaceDesc};
-use crate::{AnimationChoice, ImportError, Imported, Options, Play};
+use crate::{AnimationChoice, ErrorKind, ImportError, Imported, Limits, Options, Play};
 
 /// A file with a triangle at node 0 and its numbers in a buffer.
 struct File {
@@ -126,6 +126,23 @@ fn an_animation_is_chosen_by_name_or_number() {
         report.animations.iter().map(|a| (a.name.as_str(), a.channels)).collect::<Vec<_>>(),
         [("go", 1), ("stay", 0)]
     );
+}
+
+#[test]
+fn the_keys_of_all_animations_are_limited_together() {
+    let mut file = File::new();
+    // Two times and two values.
+    file.channel("node 0 translation", "VEC3", &[0.0, 0.0, 0.0, 4.0, 0.0, 0.0]);
+    let again = file.json["animations"][0].clone();
+    file.list("animations").push(again);
+    let read = |elements: u64| {
+        let play = Play { animation: AnimationChoice::All, time: 1.0, ..Play::default() };
+        let limits = Limits { elements, ..Limits::default() };
+        file.read(&Options { play: Some(play), limits, ..Options::default() })
+    };
+    assert!(read(8).is_ok());
+    let error = read(7).expect_err("too many");
+    assert!(matches!(error.kind, ErrorKind::Limit(_)) && error.place.starts_with("/animations/1/"), "{error}");
 }
 
 #[test]
