@@ -44,7 +44,8 @@ pub fn read(path: impl AsRef<Path>, options: &Options) -> Result<Imported, Impor
 pub fn read_bytes(bytes: &[u8], path: impl AsRef<Path>, options: &Options) -> Result<Imported, ImportError> {
     let path = path.as_ref();
     let mut report = Report::default();
-    let mut builder = Builder { path, limits: &options.limits, model: Model::default(), known: HashMap::new() };
+    let mut builder =
+        Builder { path, limits: &options.limits, model: Model::default(), triangles: 0, known: HashMap::new() };
     // Binary files may begin with "solid" as well; their length tells.
     let unit = if is_binary(bytes) || !is_ascii(bytes) {
         builder.binary(bytes, &mut report)?;
@@ -76,6 +77,7 @@ struct Builder<'a> {
     path: &'a Path,
     limits: &'a Limits,
     model: Model,
+    triangles: u64,
     /// The vertex of each place, by the bits of its coordinates.
     known: HashMap<[u32; 3], u32>,
 }
@@ -110,7 +112,8 @@ impl Builder<'_> {
     }
 
     fn ascii(&mut self, bytes: &[u8]) -> Result<(), ImportError> {
-        let mut start = 0;
+        // The first corner of the loop that the line is in.
+        let mut open = None;
         let mut name = String::new();
         for (i, line) in bytes.split(|&b| b == b'\n').enumerate() {
             let line_number = i as u32 + 1;
@@ -121,7 +124,14 @@ impl Builder<'_> {
             let keyword = words.first().map(|w| w.to_ascii_lowercase());
             match (keyword.as_deref(), words.get(1..).unwrap_or_default()) {
                 (None, _) => {}
-                (Some("outer" | "facet" | "endfacet"), _) => start = self.model.corners.len(),
+                (Some(word @ ("outer" | "facet" | "endfacet" | "solid" | "endsolid")), _) if open.is_some() => {
+                    return Err(invalid(format!("expected vertex X Y Z or endloop, found '{word}' in a loop")));
+                }
+                (Some(word @ ("vertex" | "endloop")), _) if open.is_none() => {
+                    return Err(invalid(format!("'{word}' outside of a loop; expected 'outer loop' before it")));
+                }
+                (Some("outer"), _) => open = Some(self.model.corners.len()),
+                (Some("facet" | "endfacet"), _) => {}
                 (Some("solid"), rest) => {
                     self.part(&name);
                     name = rest.join(" ");
@@ -137,6 +147,7 @@ impl Builder<'_> {
                     self.corner([x, y, z].map(|x| x as f32));
                 }
                 (Some("endloop"), _) => {
+                    let start = open.take().unwrap_or(self.model.corners.len());
                     let corners = self.model.corners.len() - start;
                     if corners < 3 {
                         return Err(invalid(format!("a loop of {corners} vertices; expected 3")));
@@ -149,7 +160,7 @@ impl Builder<'_> {
                 }
             }
         }
-        if start < self.model.corners.len() && self.model.faces.last().is_none_or(|f| f.range().end <= start) {
+        if open.is_some() {
             let cause = "the file ends in a loop without 'endloop'";
             return Err(ImportError::invalid(self.path, "", cause));
         }
@@ -176,11 +187,14 @@ impl Builder<'_> {
         self.model.corners.push(Corner { position, uv: NONE, normal: NONE });
     }
 
+    /// Makes a face of the corners from `start` on, of which there are at least 3.
     fn face(&mut self, start: usize, line: u32) -> Result<(), ImportError> {
         let len = (self.model.corners.len() - start) as u32;
+        self.triangles += u64::from(len.saturating_sub(2));
+        self.check_room(self.triangles)?;
         let part = self.model.parts.len() as u32;
         self.model.faces.push(Face { start: start as u32, len, line, part, smoothing: 0 });
-        self.check_room(self.model.corners.len() as u64 / 3)
+        Ok(())
     }
 
     fn check_room(&self, triangles: u64) -> Result<(), ImportError> {

@@ -82,6 +82,10 @@ fn errors_name_the_line_or_byte() {
         ("vertex 1 0 0e0", "vertex 1 zero 0", "a.stl: line 5: expected three numbers, found 'vertex 1 zero 0'"),
         ("vertex 1 0 0e0", "vertex 1 0", "a.stl: line 5: expected solid"),
         ("vertex 1 0 0e0", "", "a.stl: line 7: a loop of 2 vertices; expected 3"),
+        ("endloop", "endloop\nendloop", "a.stl: line 8: 'endloop' outside of a loop; expected 'outer loop' before it"),
+        ("endloop\n", "\n", "a.stl: line 8: expected vertex X Y Z or endloop, found 'endfacet' in a loop"),
+        ("outer loop", "", "a.stl: line 4: 'vertex' outside of a loop; expected 'outer loop' before it"),
+        ("outer loop", "outer loop\nouter loop", "a.stl: line 4: expected vertex X Y Z or endloop, found 'outer' in a"),
     ] {
         let error = read(text.replacen(from, to, 1).as_bytes()).expect_err(wanted);
         assert!(error.starts_with(wanted), "{error}\n{wanted}");
@@ -100,6 +104,19 @@ fn errors_name_the_line_or_byte() {
         let error = super::read_bytes(bytes, Path::new("a.stl"), &few).expect_err("two triangles");
         assert!(matches!(error.kind, ErrorKind::Limit(_)), "{error}");
     }
+}
+
+#[test]
+fn the_triangles_of_polygons_are_counted() {
+    // One loop of a hundred vertices: 98 triangles.
+    let corners: String = (0..100_i32).map(|k| format!("vertex {k} {} 0\n", k * k)).collect();
+    let text = format!("solid\nfacet\nouter loop\n{corners}endloop\nendfacet\nendsolid\n");
+    let read = |elements: u64| {
+        let options = Options { limits: Limits { elements, ..Limits::default() }, ..Options::default() };
+        super::read_bytes(text.as_bytes(), Path::new("a.stl"), &options)
+    };
+    assert_eq!(read(98).unwrap().report.triangles_all_scenes, 98);
+    assert!(matches!(read(97).unwrap_err().kind, ErrorKind::Limit(_)));
 }
 
 proptest! {
