@@ -208,6 +208,8 @@ impl Reader<'_> {
                     let line = self.values.line().unwrap_or(face as u32);
                     let count = self.list_length(element, face, property)?;
                     let start = self.model.corners.len();
+                    // Few bytes can say many numbers: before they are read.
+                    self.check_corners((start as u64).saturating_add(count))?;
                     for _ in 0..count {
                         let index = self.value(element, face, property, property.kind)?;
                         let position = self.index(element, face, index, strips)?;
@@ -239,11 +241,19 @@ impl Reader<'_> {
             self.model.corners.truncate(start);
             return Ok(());
         }
-        let (Ok(start), Ok(len)) = (u32::try_from(start), u32::try_from(len)) else {
-            let cause = "the faces have more than 2^32 corners";
-            return Err(ImportError::new(self.path, "", ErrorKind::Limit(cause.into())));
-        };
-        self.model.faces.push(Face { start, len, line, part: 0, smoothing: 0 });
+        self.check_corners(self.model.corners.len() as u64)?;
+        self.model.faces.push(Face { start: start as u32, len: len as u32, line, part: 0, smoothing: 0 });
+        Ok(())
+    }
+
+    /// A polygon of n corners makes n - 2 triangles; so whoever counts the corners counts both.
+    fn check_corners(&self, count: u64) -> Result<(), ImportError> {
+        // They are numbered by 32 bits.
+        let limit = self.limits.elements.min(u64::from(NONE));
+        if count > limit {
+            let cause = format!("more than {limit} corners of faces");
+            return Err(ImportError::new(self.path, self.values.place(), ErrorKind::Limit(cause)));
+        }
         Ok(())
     }
 

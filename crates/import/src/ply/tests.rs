@@ -182,6 +182,22 @@ fn declared_counts_are_checked_before_anything_is_allocated() {
 }
 
 #[test]
+fn corners_and_triangles_are_limited_while_they_are_read() {
+    let read = |element: &str, list: &str, elements: u64| {
+        let text = format!("element {element} 1\nproperty list int char vertex_index\n{VERTICES}{list}\n");
+        let options = Options { limits: Limits { elements, ..Limits::default() }, ..Options::default() };
+        super::read_bytes(&body(&text), Path::new("a.ply"), &options).map_err(|e| (e.place, e.kind.to_string()))
+    };
+    // Nine numbers are seven triangles of three corners.
+    let strip = "9 0 1 2 3 4 0 1 2 3";
+    assert_eq!(mesh(&read("tristrips", strip, 21).unwrap()).triangles.len(), 7);
+    for (element, list, limit) in [("tristrips", strip, 20), ("tristrips", strip, 8), ("face", "6 0 1 3 4 2 0", 5)] {
+        let wanted = ("line 15".to_owned(), format!("more than {limit} corners of faces"));
+        assert_eq!(read(element, list, limit).unwrap_err(), wanted);
+    }
+}
+
+#[test]
 fn infinite_vertices_cost_only_their_faces() {
     let faces = "element face 2\nproperty list int int vertex_index\nend_header\n";
     let bytes = body(&format!("{faces}nan 0 0\n1 0 0\n0 1 0\n1 1 0\n0 2 0\n3 0 1 2\n3 1 3 2\n"));
