@@ -238,7 +238,7 @@ pub fn winding_number(scene: &Scene, point: DVec3) -> f64 {
         let around = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
         let angle = 2.0 * a.cross(b).dot(c).atan2(around);
         // A mirrored mesh keeps its outside.
-        let mirrored = scene.instances()[id.instance as usize].transform.linear().determinant() < 0.0;
+        let mirrored = scene.instances()[id.instance as usize].transform.mirrors();
         if mirrored { -angle } else { angle }
     });
     angles.sum::<f64>() / (4.0 * core::f64::consts::PI)

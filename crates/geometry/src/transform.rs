@@ -47,6 +47,7 @@ pub struct Transform {
     normal: DMat3,
     /// See [`Transform::longest_preimage`].
     longest_preimage: f64,
+    mirrors: bool,
     /// The linear part is a multiple of the identity, as that of most meshes: worth a test for every ray.
     uniform: bool,
 }
@@ -80,13 +81,19 @@ impl Transform {
         let uniform = m.matrix3 == DMat3::IDENTITY * m.matrix3.x_axis.x;
         let (linear, inverse) = (m.matrix3, inverse * (1.0 / k));
         let longest_preimage = stretch / k * (1.0 + 1e-6);
-        Ok(Self { linear, translation: m.translation, inverse, normal, longest_preimage, uniform })
+        Ok(Self { linear, translation: m.translation, inverse, normal, longest_preimage, mirrors: det < 0.0, uniform })
     }
 
     /// The linear part.
     #[must_use]
     pub fn linear(&self) -> DMat3 {
         self.linear
+    }
+
+    /// Whether left becomes right: the determinant is negative.
+    #[must_use]
+    pub fn mirrors(&self) -> bool {
+        self.mirrors
     }
 
     /// Whether the linear part is a multiple of the identity.

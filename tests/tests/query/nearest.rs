@@ -162,3 +162,38 @@ fn all_tiers_answer_alike() {
         }
     }
 }
+
+/// Points that follow each other, on a mesh far from its own origin: the batch has the bits of single queries.
+#[test]
+fn neighbours_far_from_the_meshs_origin() {
+    let c = 4e6f32;
+    let mut builder = SceneBuilder::default();
+    let positions = vec![Vec3::splat(c), Vec3::new(c + 1.0, c, c), Vec3::new(c, c + 1.0, c)];
+    let mesh = builder.add_mesh(vec![Geometry::Triangles { positions, triangles: vec![[0, 1, 2]] }]);
+    builder.add_instance(mesh, DAffine3::from_translation(DVec3::splat(-4e6)));
+    let scene = builder.build().expect("a triangle");
+    let points: Vec<DVec3> =
+        (0..1000).map(f64::from).map(|i| DVec3::new(-0.3 - 0.001 * i, -0.2 - 0.0007 * i, 0.1 + 0.0003 * i)).collect();
+    let mut found = vec![None; points.len()];
+    scene.closest_points(&points, f64::INFINITY, &mut found);
+    assert!(points.iter().zip(&found).all(|(p, found)| found.is_some() && *found == scene.closest_point(*p)));
+}
+
+/// Coordinates of all sizes, at the tier that keeps every digit.
+#[test]
+fn exact_meshes_of_all_sizes_have_nearest_points() {
+    let huge = 2f32.powi(90);
+    let mut builder = SceneBuilder::new(BuildOptions { precision: Precision::Exact, ..BuildOptions::default() });
+    let positions: Vec<Vec3> = (0..192)
+        .map(|i| Vec3::new(huge * (1.0 + (i / 3) as f32), (i % 3) as f32 * huge, (i % 2) as f32 * 2f32.powi(-149)))
+        .collect();
+    let triangles = (0..64).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
+    let mut positions = positions;
+    positions.iter_mut().skip(1).step_by(3).for_each(|p| p.z = huge);
+    let mesh = builder.add_mesh(vec![Geometry::Triangles { positions, triangles }]);
+    builder.add_instance(mesh, DAffine3::IDENTITY);
+    let scene = builder.build().expect("a mesh");
+    let (got, expected) = (scene.closest_point(DVec3::ZERO), reference::closest_point(&scene, DVec3::ZERO));
+    assert!(got.is_some());
+    assert_eq!(got.map(|c| (c.id, c.distance)), expected.map(|c| (c.id, c.distance)));
+}

@@ -179,3 +179,79 @@ fn the_open_bunny() {
         "winding numbers of the open bunny: {count} points, {inside} inside; fast: {worst:.4} off at most"
     ));
 }
+
+/// An open quad, bent.
+fn quad() -> Geometry {
+    let corner = |x, y, z| Vec3::new(x, y, z);
+    Geometry::Triangles {
+        positions: vec![Vec3::ZERO, corner(1.0, 0.1, 0.0), corner(0.9, 1.0, 0.3), corner(0.0, 1.0, 0.1)],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+    }
+}
+
+/// Where a ray would pass the edge at which a surface ends, another one is taken: on which side it passes is not certain.
+#[test]
+fn winding_numbers_do_not_jump_where_rays_meet_edges() {
+    let corners = [DVec3::ZERO, DVec3::new(1.0, 0.1, 0.0), DVec3::new(0.9, 1.0, 0.3), DVec3::new(0.0, 1.0, 0.1)]
+        .map(|p| p.as_vec3().as_dvec3());
+    for precision in Precision::ALL {
+        let mut builder = SceneBuilder::new(BuildOptions { precision, ..BuildOptions::default() });
+        let mesh = builder.add_mesh(vec![quad()]);
+        builder.add_instance(mesh, DAffine3::IDENTITY);
+        let scene = builder.build().expect("a quad");
+        let solid = Solid::with_method(&scene, SignMethod::Winding);
+        // The directions that rays of its first vote have, in any of their orders.
+        let tilt = [0.312_7 * 0.7f64.cos() + 0.011_3, 0.287_1 * 0.7f64.sin() - 0.017_9];
+        let mut checked = 0;
+        for (axis, side) in [(0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0), (2, 1.0), (2, -1.0)] {
+            let mut direction = DVec3::ZERO;
+            direction[axis] = side;
+            direction[(axis + 1) % 3] = tilt[0];
+            direction[(axis + 2) % 3] = tilt[1];
+            for k in 0..4 {
+                for step in 0..400 {
+                    let on = corners[k].lerp(corners[(k + 1) % 4], f64::from(step) / 400.0);
+                    for s in [0.01, 0.1, 0.3] {
+                        let p = on - direction * s;
+                        let (got, expected) = (solid.winding_number(p), reference::winding_number(&scene, p));
+                        assert!((got - expected).abs() < 1e-6, "{precision} {p}: {got} {expected}");
+                        checked += 1;
+                    }
+                }
+            }
+        }
+        assert_eq!(checked, 28_800);
+    }
+}
+
+/// Stretched, turned, mirrored, tiny: the clusters' sum is near the exact one. (The twin's products vanish where all is tiny.)
+#[test]
+fn clusters_of_stretched_instances() {
+    let sheared = glam::DMat3::from_cols(DVec3::X, DVec3::new(0.7, 1.0, 0.0), DVec3::new(-0.3, 0.4, 1.0));
+    let mirrored = DVec3::new(-1.0, 1.0, 1.0);
+    for (place, size) in [
+        (DAffine3::from_scale(DVec3::new(1.0, 1.0, 10.0)), 1.0),
+        (DAffine3::from_scale(DVec3::new(-5.0, 5.0, 1.0)), 1.0),
+        (DAffine3::from_scale(mirrored), 1e-110),
+        (DAffine3::from_mat3(sheared), 1.0),
+    ] {
+        let scene = |place| {
+            let mut builder = SceneBuilder::default();
+            let mesh = builder.add_mesh(vec![quad(), cube(&CUBE[2..])]);
+            builder.add_instance(mesh, place);
+            builder.build().expect("a mesh")
+        };
+        let (of_size, plain) = (scene(DAffine3::from_scale(DVec3::splat(size)) * place), scene(place));
+        let fast = Solid::with_method(&of_size, SignMethod::FastWinding { accuracy: 2.0 });
+        let exact = Solid::with_method(&of_size, SignMethod::Winding);
+        for p in [DVec3::new(0.1, 0.1, -1.0), DVec3::new(0.4, 0.5, 0.6), DVec3::new(3.0, -2.0, 1.0)] {
+            let p = place.transform_point3(p);
+            let expected = reference::winding_number(&plain, p);
+            let (fast, exact) = (fast.winding_number(p * size), exact.winding_number(p * size));
+            assert!(
+                (fast - expected).abs() < 0.02 && (exact - expected).abs() < 1e-6,
+                "{place:?} {fast} {exact} {expected}"
+            );
+        }
+    }
+}

@@ -88,10 +88,16 @@ impl<'a> Seen<'a> {
 
     /// The limit in the object's space, as squared distance from the rounded point: never too small.
     fn limit(&self, squared: f64) -> f32 {
-        let far = (squared.sqrt() * (1.0 + 1e-9) + self.off) * self.longest_preimage + self.rounded;
-        // Room for what is rounded where it is compared. What is not a number is any distance.
-        let limit = far * far * (1.0 + 1e-5);
+        let limit = self.wide_limit(squared);
+        // What is not a number is any distance.
         if limit < f64::from(f32::MAX) { (limit as f32).next_up() } else { f32::MAX }
+    }
+
+    /// The same without an end.
+    fn wide_limit(&self, squared: f64) -> f64 {
+        let far = (squared.sqrt() * (1.0 + 1e-9) + self.off) * self.longest_preimage + self.rounded;
+        // Room for what is rounded where it is compared.
+        far * far * (1.0 + 1e-5)
     }
 
     /// Offers what of the model lies within the limit.
@@ -99,14 +105,14 @@ impl<'a> Seen<'a> {
         let model = self.model;
         // From so far that single precision tells nothing (or from where distances are no numbers) all is looked at.
         if !(self.point.abs().max_element() < FAR) {
-            model.each_triangle(|number, vertices| self.triangle(number, &vertices, keep));
+            model.each_triangle(|number, vertices| self.triangle(number, &double(&vertices), keep));
         } else if let Some((tree, level)) = model.wide() {
             simd::run(level, Search(Triangles { seen: self, tree, keep }));
         } else if let Some((tree, level)) = model.compact() {
             simd::run(level, Search(Triangles { seen: self, tree, keep }));
         } else if let Some(tree) = model.binary() {
             let point = self.point.as_dvec3();
-            let limit = |keep: &dyn Keep| f64::from(self.limit(keep.limit()));
+            let limit = |keep: &dyn Keep| self.wide_limit(keep.limit());
             walk_binary(
                 tree,
                 |b| squared_distance(b, point),
@@ -114,7 +120,7 @@ impl<'a> Seen<'a> {
                 |places| {
                     for place in places {
                         if let Some((number, vertices)) = model.numbered(place) {
-                            self.triangle(number, &vertices, keep);
+                            self.triangle(number, &double(&vertices), keep);
                         }
                     }
                     limit(keep)
@@ -124,8 +130,7 @@ impl<'a> Seen<'a> {
     }
 
     /// Measures the triangle with this number.
-    fn triangle(&self, number: u32, vertices: &[Vec3; 3], keep: &mut dyn Keep) {
-        let [a, b, c] = double(vertices);
+    pub(crate) fn triangle(&self, number: u32, &[a, b, c]: &[DVec3; 3], keep: &mut dyn Keep) {
         let relative = match self.uniform {
             Some(s) => [a * s + self.offset, b * s + self.offset, c * s + self.offset],
             None => [self.linear * a + self.offset, self.linear * b + self.offset, self.linear * c + self.offset],

@@ -8,6 +8,7 @@ use glam::{DVec3, Vec3};
 
 use super::bounds::Point;
 use super::{Keep, Seen};
+use crate::kernel::double;
 use crate::layout::Bvh2;
 use crate::layout::wide8::Reference;
 use crate::simd::{Lanes, Stack, Work};
@@ -104,7 +105,7 @@ impl<L: Lanes, T: WideTree> Boxed<L> for Triangles<'_, '_, T> {
             }
             let place = leaf.place(lane);
             if let Some(number) = self.seen.model.number(place).filter(|&n| n != u32::MAX) {
-                self.seen.triangle(number, &self.tree.triangle(place), self.keep);
+                self.seen.triangle(number, &double(&self.tree.triangle(place)), self.keep);
                 limit = self.seen.limit(self.keep.limit());
             }
         }

@@ -55,8 +55,8 @@ impl Keep for Nearest {
     }
 }
 
-/// A point of the surface from which the search for the next point may profit, and the size of what was rounded in it.
-type Last = Option<(DVec3, f64)>;
+/// Instance and number of the triangle that is nearest to the last point: the next point's may not be far from it.
+type Last = Option<(u32, u32)>;
 
 /// What is nearest to a point.
 impl Scene {
@@ -64,7 +64,8 @@ impl Scene {
     /// `None` if there is no triangle, or the point is not finite.
     ///
     /// At every tier it is found in `f64`, relative to the point: its error is some units in the last place of the largest
-    /// of the distance and the coordinates of the triangle as seen from the point. Triangles of which two corners
+    /// of the distance and the coordinates of the triangle as seen from the point. (Squares of distances must be numbers:
+    /// those of more than 1e150 are all alike, and so are those of less than 1e-150.) Triangles of which two corners
     /// coincide are not part of the surface; nor are analytic shapes, which have no such query yet.
     ///
     /// ```
@@ -148,16 +149,13 @@ impl Scene {
         if !(point.is_finite() && radius >= 0.0) {
             return None;
         }
-        // What is nearest to the last point is not far from a neighbour's nearest. Room for all that is rounded.
-        let guess = last.map_or(f64::INFINITY, |(at, size)| {
-            let far = at.distance(point) + (size + point.abs().max_element()) * 2f64.powi(-40);
-            far * far
-        });
-        let mut keep = Nearest { limit: (radius * radius).min(guess), best: None };
+        let mut keep = Nearest { limit: radius * radius, best: None };
+        if let Some((instance, number)) = *last {
+            self.inner().measure(point, instance, number, &mut keep);
+        }
         self.inner().near(point, &mut keep);
         if let Some(best) = &keep.best {
-            let at = point + best.at.point;
-            *last = Some((at, at.abs().max(point.abs()).max_element()));
+            *last = Some((best.instance, best.number));
         }
         keep.best
     }
@@ -182,6 +180,15 @@ impl Scene {
 }
 
 impl Inner {
+    /// Offers one triangle, if it lies within the limit.
+    fn measure(&self, point: DVec3, instance: u32, number: u32, keep: &mut dyn Keep) {
+        let placed = &self.instances[instance as usize];
+        let model = &self.models[placed.model as usize];
+        if let Some(corners) = model.of_number(number).and_then(|part| model.corners(part)) {
+            Seen::new(model, instance, &placed.transform, point).triangle(number, &corners, keep);
+        }
+    }
+
     /// Offers what lies within the limit of what keeps it.
     pub(crate) fn near(&self, point: DVec3, keep: &mut dyn Keep) {
         self.above().nearest(point, keep.limit(), &mut |run| {

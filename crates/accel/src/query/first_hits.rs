@@ -1,5 +1,6 @@
 //! The first few hits.
 
+use core::cmp::Ordering;
 use core::ops::ControlFlow;
 
 use firsthit_geometry::Ray;
@@ -7,22 +8,29 @@ use firsthit_geometry::Ray;
 use super::{Collect, Crossings, Take};
 use crate::{Hit, HitId, Scene};
 
-/// Keeps so many, in order.
+/// Keeps so many of the first, and up to as many more until they are looked through.
 struct First<'a, O> {
     count: usize,
     order: O,
     hits: &'a mut Vec<Hit>,
 }
 
-impl<O: Fn(&Hit, &Hit) -> bool> Take for First<'_, O> {
+impl<O: Fn(&Hit, &Hit) -> Ordering> First<'_, O> {
+    /// Forgets all but the first; the last of them is at the end of the list.
+    fn look_through(&mut self) {
+        if self.hits.len() > self.count {
+            self.hits.select_nth_unstable_by(self.count - 1, &self.order);
+            self.hits.truncate(self.count);
+        }
+    }
+}
+
+impl<O: Fn(&Hit, &Hit) -> Ordering> Take for First<'_, O> {
     fn take(&mut self, hit: Hit, t_max: &mut f64) -> ControlFlow<(), bool> {
-        let at = self.hits.partition_point(|other| (self.order)(other, &hit));
-        if at < self.count {
-            if self.hits.len() == self.count {
-                self.hits.pop();
-            }
-            self.hits.insert(at, hit);
-            if let Some(last) = self.hits.last().filter(|_| self.hits.len() == self.count) {
+        self.hits.push(hit);
+        if self.hits.len() >= self.count.saturating_mul(2) {
+            self.look_through();
+            if let Some(last) = self.hits.last() {
                 // A little later: at `Exact` the interval is compared with what is not rounded yet.
                 *t_max = t_max.min(last.t.next_up());
             }
@@ -33,7 +41,8 @@ impl<O: Fn(&Hit, &Hit) -> bool> Take for First<'_, O> {
 }
 
 impl Scene {
-    /// The first `count` of [`Scene::all_hits`], found without the others: what lies behind the last of them is not looked at.
+    /// The first `count` of [`Scene::all_hits`], found without most of the others: what lies far behind the last of them
+    /// is not looked at.
     ///
     /// ```
     /// use firsthit_accel::{Crossings, Geometry, SceneBuilder};
@@ -74,10 +83,12 @@ impl Scene {
         if count == 0 {
             return;
         }
-        let order = |a: &Hit, b: &Hit| self.order(ray, a, b).is_lt();
+        let order = |a: &Hit, b: &Hit| self.order(ray, a, b);
         let mut first = Collect::new(ray, self.flat(source), accept, First { count, order, hits: &mut *hits });
         // It never breaks.
         let _ = self.collect(ray, crossings, &mut first);
+        first.take.look_through();
+        hits.sort_by(|a, b| self.order(ray, a, b));
         for hit in hits {
             *hit = self.finished(*hit);
         }

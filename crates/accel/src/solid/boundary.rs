@@ -51,21 +51,26 @@ impl Boundary {
 
     /// What the cone from the boundary to infinity, in a direction, takes from the solid angle around a point: the sum over its edges
     /// of the spherical triangles with that direction (van Oosterom and Strackee 1983), signed.
-    pub(super) fn solid_angle(&self, transform: &Transform, point: DVec3, apex: DVec3) -> f64 {
+    ///
+    /// `None` if the ray that goes the other way passes so close to an edge, given what is rounded in a scene of some `size`,
+    /// that it is not certain on which side: there the sum jumps by 4 pi, as does the number of crossings.
+    pub(super) fn solid_angle(&self, transform: &Transform, point: DVec3, apex: DVec3, size: f64) -> Option<f64> {
         let (linear, offset) = (transform.linear(), transform.translation() - point);
         let apex = apex.normalize_or_zero();
-        let sum: f64 = self
-            .edges
-            .iter()
-            .map(|(ends, times)| {
-                let [a, b] = ends.map(|p| linear * p.as_dvec3() + offset);
-                let (la, lb) = (a.length(), b.length());
-                let volume = a.cross(b).dot(apex);
-                let around = la * lb + a.dot(b) + b.dot(apex) * la + apex.dot(a) * lb;
-                2.0 * volume.atan2(around) * f64::from(*times)
-            })
-            .sum();
+        let mut sum = 0.0;
+        for (ends, times) in &self.edges {
+            let [a, b] = ends.map(|p| linear * p.as_dvec3() + offset);
+            let (la, lb) = (a.length(), b.length());
+            let volume = a.cross(b).dot(apex);
+            let around = la * lb + a.dot(b) + b.dot(apex) * la + apex.dot(a) * lb;
+            // Single precision, many times over; the distance is that of the two lines.
+            let close = (size + la + lb) * 2f64.powi(-18);
+            if around <= la * lb * 1e-4 && volume.abs() <= (b - a).cross(apex).length() * close {
+                return None;
+            }
+            sum += 2.0 * volume.atan2(around) * f64::from(*times);
+        }
         // A mirrored mesh keeps its outside.
-        if linear.determinant() < 0.0 { -sum } else { sum }
+        Some(if transform.mirrors() { -sum } else { sum })
     }
 }

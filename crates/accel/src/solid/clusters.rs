@@ -4,8 +4,9 @@
 use core::f64::consts::PI;
 use core::ops::Range;
 
+use firsthit_geometry::Real;
 use firsthit_geometry::transform::Transform;
-use glam::{DVec3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 
 use crate::model::Model;
 
@@ -65,27 +66,42 @@ impl Clusters {
         index
     }
 
-    /// The winding number of an instance around a point of the world, in the space of the object: what is not closed has another
-    /// solid angle there if the instance is stretched.
+    /// The winding number of an instance around a point of the world.
     pub(super) fn winding_number(&self, transform: &Transform, point: DVec3, accuracy: f64) -> f64 {
-        let point = transform.point_to_object(point);
+        // Solid angles have no size: powers of two keep products from vanishing.
+        let linear = transform.linear();
+        let size = linear.to_cols_array().iter().fold(0.0f64, |m, x| m.max(x.abs())).power_of_two_below();
+        let (linear, offset) = (linear * (1.0 / size), (transform.translation() - point) / size);
+        let stretch = if transform.is_uniform() {
+            linear.x_axis.x.abs()
+        } else {
+            linear.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt()
+        };
+        // How area vectors are mapped; a mirrored mesh keeps its outside.
+        let side = if transform.mirrors() { -1.0 } else { 1.0 };
+        let (x, y, z) = (linear.x_axis, linear.y_axis, linear.z_axis);
+        let areas = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * side;
+        let volume = linear.determinant().abs();
+
         let mut sum = 0.0;
         let mut stack = Vec::with_capacity(64);
         stack.extend((!self.nodes.is_empty()).then_some(0u32));
         while let Some(at) = stack.pop() {
             let node = &self.nodes[at as usize];
-            let from = node.centre - point;
+            let from = linear * node.centre + offset;
             let distance = from.length();
-            if distance > node.radius * accuracy.max(1.0) {
-                // The gradient of 1 / r, and its gradient.
+            if distance > node.radius * stretch * accuracy.max(1.0) {
+                // The gradient of 1 / r, and its gradient; for the moments as they are in the object's space.
                 let cube = 1.0 / (distance * distance * distance);
+                let (for_places, for_areas) = (linear.transpose() * from, areas.transpose() * from);
                 let [x, y, z] = node.first;
-                let trace = x.x + y.y + z.z;
-                let along = from.dot(DVec3::new(x.dot(from), y.dot(from), z.dot(from)));
-                sum += cube * (node.area.dot(from) + trace - 3.0 * along / (distance * distance));
+                let trace = (x.x + y.y + z.z) * volume;
+                let along = for_areas.dot(DVec3::new(x.dot(for_places), y.dot(for_places), z.dot(for_places)));
+                sum += cube * (node.area.dot(for_areas) + trace - 3.0 * along / (distance * distance));
             } else if node.second == 0 {
                 let range = node.triangles.start as usize..node.triangles.end as usize;
-                sum += self.triangles[range].iter().map(|t| solid_angle(t, point)).sum::<f64>();
+                let angle = |t: &[Vec3; 3]| solid_angle(t.map(|p| linear * p.as_dvec3() + offset));
+                sum += self.triangles[range].iter().map(angle).sum::<f64>() * side;
             } else {
                 stack.extend([node.second, at + 1]);
             }
@@ -119,9 +135,8 @@ fn node(triangles: &[[Vec3; 3]], range: Range<usize>) -> Node {
     Node { centre, radius, area, first, triangles: range.start as u32..range.end as u32, second: 0 }
 }
 
-/// Signed solid angle of a triangle (van Oosterom and Strackee 1983): positive from behind.
-fn solid_angle(triangle: &[Vec3; 3], point: DVec3) -> f64 {
-    let [a, b, c] = triangle.map(|p| p.as_dvec3() - point);
+/// Signed solid angle of a triangle as seen from the origin (van Oosterom and Strackee 1983): positive from behind.
+fn solid_angle([a, b, c]: [DVec3; 3]) -> f64 {
     let (la, lb, lc) = (a.length(), b.length(), c.length());
     let around = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
     2.0 * a.cross(b).dot(c).atan2(around)

@@ -25,8 +25,8 @@ use clusters::Clusters;
 ///
 /// | method | needs | wrong where | cost |
 /// |---|---|---|---|
-/// | `Winding` | nothing | nowhere, but that holes are closed by what the number makes of them | a ray, and a sum over the edges at holes |
-/// | `FastWinding` | nothing | close to the surface of open meshes, where the number is near one half | some hundred terms |
+/// | `Winding` | triangles that agree about what is outside | where they do not; holes are closed by what the number makes of them | a ray, and a sum over the edges at holes |
+/// | `FastWinding` | the same | there too, and close to the surface of open meshes, where the number is near one half | some hundred terms |
 /// | `Parity` | closed meshes, of any orientation | bodies that overlap | a ray for each vote |
 /// | `Pseudonormal` | closed, oriented meshes that do not cut themselves | elsewhere | none beside the distance |
 /// | `Exact` | closed meshes, of any orientation | bodies that overlap | a ray, decided exactly |
@@ -34,7 +34,7 @@ use clusters::Clusters;
 #[non_exhaustive]
 pub enum SignMethod {
     /// Inside is where the generalised winding number (Jacobson, Kavan and Sorkine-Hornung 2013) is beyond one half, of
-    /// either sign. It is found exactly: the signed crossings of one ray, and the solid angle between the ray and each
+    /// either sign. It is found without approximation: the signed crossings of one ray, and the solid angle between the ray and each
     /// edge where the surface ends (the cone that closes the surface; as in Martens and Bessmeltsev 2025). Bodies may
     /// overlap, and holes have a natural lid.
     Winding,
@@ -230,14 +230,22 @@ impl Solid {
             };
             return self.of_instances(&self.clusters).map(of).sum();
         }
-        let ray = self.ray(point, 0);
-        let crossings = self.crossings(&ray);
-        let open: f64 = self
-            .of_instances(&self.boundaries)
-            .filter(|(_, boundary)| !boundary.edges.is_empty())
-            .map(|(instance, boundary)| boundary.solid_angle(&instance.transform, point, -ray.direction))
-            .sum();
-        crossings.signed as f64 + open / (4.0 * PI)
+        if self.boundaries.iter().all(|b| b.edges.is_empty()) {
+            return self.crossings(&self.ray(point, 0)).signed as f64;
+        }
+        let size = self.scene.bounds().extent().max_element();
+        // Where a ray passes an edge closely, another one is taken.
+        for vote in 0..ATTEMPTS {
+            let ray = self.ray(point, vote);
+            let angles = self
+                .of_instances(&self.boundaries)
+                .map(|(instance, boundary)| boundary.solid_angle(&instance.transform, point, -ray.direction, size));
+            if let Some(open) = angles.sum::<Option<f64>>() {
+                return self.crossings(&ray).signed as f64 + open / (4.0 * PI);
+            }
+        }
+        // On an edge, as far as can be told: the sum that needs no ray.
+        crate::reference::winding_number(&self.scene, point)
     }
 
     /// Each instance with what belongs to its model.
@@ -284,6 +292,9 @@ impl Solid {
         let _ = self.scene.inner().trace_by::<true, Exact, _, _>(ray, &mut Dyn(&mut all), &mut Off);
     }
 }
+
+/// Directions that are tried.
+const ATTEMPTS: u32 = 16;
 
 /// Points that one task takes.
 const CHUNK: usize = 1024;

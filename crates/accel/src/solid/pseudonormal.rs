@@ -21,6 +21,10 @@ impl Keep for Ties {
     fn offer(&mut self, near: Near) {
         if self.nearest.is_none_or(|nearest| near.comes_before(&nearest)) {
             self.nearest = Some(near);
+            let limit = self.limit();
+            if self.all.last().is_some_and(|last| last.squared > limit) {
+                self.all.retain(|other| other.squared <= limit);
+            }
         }
         self.all.push(near);
     }
