@@ -235,9 +235,10 @@ pub(crate) struct QualityArgs {
     pub(crate) texture_filter: TextureFilter,
 }
 
-#[derive(Args, Debug)]
+/// From where something is seen.
+#[derive(Args, Clone, Debug, Default, PartialEq)]
 #[command(next_help_heading = "Camera")]
-pub(crate) struct CameraArgs {
+pub(crate) struct ViewArgs {
     /// A camera of the file by name or by number from 0; `auto` frames the model
     #[arg(long, value_name = "NAME|INDEX|auto", default_value = "auto", value_parser = values::camera)]
     pub(crate) camera: CameraChoice,
@@ -273,6 +274,13 @@ pub(crate) struct CameraArgs {
     /// Parallel projection
     #[arg(long)]
     pub(crate) camera_orthographic: bool,
+}
+
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Camera")]
+pub(crate) struct CameraArgs {
+    #[command(flatten)]
+    pub(crate) view: ViewArgs,
 
     /// Diameter of its lens, in world units: what is not in focus is blurred; 0 is a pinhole [default: the scene file's]
     #[arg(long, value_name = "WIDTH", value_parser = values::number)]

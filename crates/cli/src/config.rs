@@ -193,7 +193,7 @@ mod tests {
         assert_eq!(args.output.resolution.map(|r| (r.width, r.height)), Some((64, 32)));
         assert_eq!(args.output.crop.map(|c| c.height), Some(4));
         assert_eq!(args.output.exposure, -0.5);
-        assert_eq!(args.camera.camera_position.map(|p| p.x), Some(-1.0));
+        assert_eq!(args.camera.view.camera_position.map(|p| p.x), Some(-1.0));
         assert_eq!(args.output.aov.as_ref().map(|a| a.0.len()), Some(2));
         assert!(args.scene.no_background && !args.run.json && args.run.no_progress && !args.run.progress);
         assert_eq!(args.scene.clip_plane.len(), 2);

@@ -13,7 +13,7 @@ use firsthit_render::{
     output::{BitDepth, WriteOptions, write_checkpoint, write_film, write_png},
 };
 
-use crate::args::{CameraArgs, QualityArgs, RenderArgs};
+use crate::args::{CameraArgs, QualityArgs, RenderArgs, ViewArgs};
 use crate::console::{Console, message, print, print_json};
 use crate::error::{Exit, Failure};
 use crate::hdri;
@@ -441,7 +441,7 @@ fn stage_options(args: &RenderArgs, render: &RenderOptions, target: &Target) -> 
             None => Background::Auto,
         },
         effects: args.quality.effects,
-        camera: args.camera.camera.clone(),
+        camera: args.camera.view.camera.clone(),
         camera_changes: camera_changes(&args.camera),
         aspect: f64::from(render.width) / f64::from(render.height),
         energy_compensation: args.quality.energy_compensation == Switch::On,
@@ -452,6 +452,11 @@ fn stage_options(args: &RenderArgs, render: &RenderOptions, target: &Target) -> 
 }
 
 fn camera_changes(args: &CameraArgs) -> CameraChanges {
+    CameraChanges { aperture: args.aperture, focus_distance: args.focus_distance, ..view_changes(&args.view) }
+}
+
+/// What the options of the camera, but for its lens, change.
+pub(crate) fn view_changes(args: &ViewArgs) -> CameraChanges {
     CameraChanges {
         position: args.camera_position,
         focal_point: args.camera_focal_point,
@@ -461,8 +466,7 @@ fn camera_changes(args: &CameraArgs) -> CameraChanges {
         elevation: args.camera_elevation_angle.to_radians(),
         zoom: args.camera_zoom_factor,
         orthographic: args.camera_orthographic,
-        aperture: args.aperture,
-        focus_distance: args.focus_distance,
+        ..CameraChanges::default()
     }
 }
 

@@ -347,3 +347,77 @@ fn an_interrupted_query_leaves_nothing_behind() {
     assert_eq!(child.wait().unwrap().code(), Some(130));
     assert_eq!(folder.files(), ["squares.obj"]);
 }
+
+#[test]
+fn the_camera_sees_parts() {
+    let folder = Folder::new();
+    let square = |name: &str, z: f32| {
+        format!("o {name}\nusemtl m{name}\n{}", {
+            let corners = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(x, y)| format!("v {x} {y} {z}\n"));
+            corners.concat() + "f -4 -3 -2\nf -4 -2 -1\n"
+        })
+    };
+    // One hides the other; the third lies beside the picture.
+    folder.write(
+        "squares.obj",
+        square("front", 0.0) + &square("be,hind", -1.0) + &square("beside", 0.0).replace("v ", "v 9"),
+    );
+    let view = ["--camera-position", "0.5,0.5,4", "--camera-focal-point", "0.5,0.5,0", "--camera-orthographic", "-q"];
+    let asked = |options: &[&str]| folder.run("visible", &[&view, options].concat());
+    let text = asked(&["--resolution", "200x100", "--camera-view-angle", "30"]).ok();
+    let rows: Vec<Vec<&str>> = text.lines().map(|l| l.split(',').collect()).collect();
+    assert_eq!(rows[0], ["instance", "geometry", "name", "material", "pixels", "share"]);
+    assert_eq!(rows.len(), 4, "{text}");
+    let pixels: u64 = rows[1][4].parse().unwrap();
+    // A square of one unit, in a picture of 8 tan 15 degrees.
+    let expected = (100.0 / (8.0 * 15_f64.to_radians().tan())).powi(2);
+    assert!((pixels as f64 / expected - 1.0).abs() < 0.05, "{text}");
+    assert!(
+        text.contains(",\"be,hind\",\"mbe,hind\",0,0.0") || text.contains(",\"be,hind\",\"mbe,hind\",0,0"),
+        "{text}"
+    );
+    for threads in ["1", "3"] {
+        let again =
+            asked(&["--resolution", "200x100", "--camera-view-angle", "30", "-t", threads, "--format", "jsonl"]);
+        let text = again.ok();
+        let first: Value = serde_json::from_str(text.lines().next().unwrap()).unwrap();
+        assert_eq!((first["pixels"].as_u64(), &first["material"]), (Some(pixels), &Value::from("mfront")));
+        assert_eq!(first["share"].as_f64(), Some(pixels as f64 / 20_000.0));
+    }
+    asked(&["--format", "npy"]).fails(2, &["names"]);
+    asked(&["--rays", "rays.csv"]).fails(2, &["--rays"]);
+    folder.run("closest", &["--resolution", "20x10"]).fails(2, &["only `visible`"]);
+    folder.run("any", &["--camera", "1"]).fails(2, &["only `visible`"]);
+}
+
+#[test]
+fn points_are_near_and_inside() {
+    let folder = Folder::new();
+    // A cube from -1 to 1.
+    folder.write(
+        "squares.obj",
+        "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\n\
+         f 5 6 7 8\nf 2 1 4 3\nf 6 2 3 7\nf 1 5 8 4\nf 8 7 3 4\nf 1 2 6 5\n",
+    );
+    folder.write("points.csv", "x,y,z\n0,0.25,0.5\n4,5,1\n");
+    let asked =
+        |question, options: &[&str]| folder.run(question, &[&["--points", "points.csv"], options].concat()).ok();
+    assert_eq!(asked("distance", &[]), "distance\n0.5\n5.0\n");
+    for sign in ["auto", "winding", "fast-winding", "parity", "pseudonormal", "exact"] {
+        assert_eq!(asked("signed-distance", &["--sign", sign]), "distance\n-0.5\n5.0\n", "{sign}");
+        assert_eq!(asked("contains", &["--sign", sign, "-t", "1"]), "inside\n1\n0\n", "{sign}");
+    }
+    assert_eq!(asked("winding-number", &[]), "winding\n1.0\n0.0\n");
+    let nearest = asked("closest-point", &["--format", "jsonl"]);
+    let first: Value = serde_json::from_str(nearest.lines().next().unwrap()).unwrap();
+    assert_eq!(["distance", "x", "y", "z", "nz"].map(|key| first[key].as_f64()), [0.5, 0.0, 0.25, 1.0, 1.0].map(Some));
+    assert_eq!(folder.pipe("distance", &["-q"], b"[1, 1, 3]\n{\"x\":0,\"y\":0,\"z\":-4}").ok(), "distance\n2.0\n3.0\n");
+    assert_eq!(
+        folder.pipe("closest-point", &["-q"], b"nan,0,0").ok().lines().nth(1).unwrap().split(',').next(),
+        Some("inf")
+    );
+    folder.pipe("contains", &[], b"1,2\n").fails(1, &["line 1: there are 2 numbers; a point has 3"]);
+    folder.run("closest", &["--points", "points.csv"]).fails(2, &["--points"]);
+    folder.run("distance", &["--rays", "points.csv"]).fails(2, &["--rays"]);
+    folder.run("distance", &["--points", "points.csv", "--sign", "parity"]).fails(2, &["--sign"]);
+}

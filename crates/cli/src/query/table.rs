@@ -16,11 +16,12 @@ pub(crate) enum Format {
 }
 
 /// A value of a row.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Cell {
     Flag(bool),
     Whole(i64),
     Real(f64),
+    Text(String),
 }
 
 /// What rows there are, and how they are written.
@@ -52,7 +53,7 @@ impl Table {
             Format::Csv => {
                 for (i, cell) in cells.iter().enumerate() {
                     out.extend_from_slice(if i > 0 { b"," } else { b"" });
-                    csv(*cell, out);
+                    csv(cell, out);
                 }
                 out.push(b'\n');
             }
@@ -61,13 +62,13 @@ impl Table {
                     out.extend_from_slice(if i > 0 { b",\"" } else { b"{\"" });
                     out.extend_from_slice(name.as_bytes());
                     out.extend_from_slice(b"\":");
-                    json(*cell, out);
+                    json(cell, out);
                 }
                 out.extend_from_slice(b"}\n");
             }
             Format::Npy => {
                 for cell in cells {
-                    out.extend_from_slice(&number(*cell).to_le_bytes());
+                    out.extend_from_slice(&number(cell).to_le_bytes());
                 }
             }
         }
@@ -77,30 +78,35 @@ impl Table {
 // Into memory nothing fails to be written. `{:?}` is the shortest text that reads back exactly, with an exponent where
 // the digits would be many.
 
-fn csv(cell: Cell, out: &mut Vec<u8>) {
+fn csv(cell: &Cell, out: &mut Vec<u8>) {
     let _ = match cell {
-        Cell::Flag(flag) => write!(out, "{}", u8::from(flag)),
+        Cell::Flag(flag) => write!(out, "{}", u8::from(*flag)),
         Cell::Whole(n) => write!(out, "{n}"),
         Cell::Real(x) => write!(out, "{x:?}"),
+        Cell::Text(text) if text.contains([',', '"', '\n', '\r']) => write!(out, "\"{}\"", text.replace('"', "\"\"")),
+        Cell::Text(text) => write!(out, "{text}"),
     };
 }
 
-fn json(cell: Cell, out: &mut Vec<u8>) {
+fn json(cell: &Cell, out: &mut Vec<u8>) {
     let _ = match cell {
         Cell::Flag(flag) => write!(out, "{flag}"),
         Cell::Whole(n) => write!(out, "{n}"),
         Cell::Real(x) if x.is_finite() => write!(out, "{x:?}"),
         // JSON has no name for it.
         Cell::Real(_) => write!(out, "null"),
+        Cell::Text(text) => write!(out, "{}", serde_json::Value::from(text.as_str())),
     };
 }
 
-fn number(cell: Cell) -> f64 {
+fn number(cell: &Cell) -> f64 {
     match cell {
-        Cell::Flag(flag) => f64::from(u8::from(flag)),
+        Cell::Flag(flag) => f64::from(u8::from(*flag)),
         // Ids have 32 bits and rays are fewer than 2^53.
-        Cell::Whole(n) => n as f64,
-        Cell::Real(x) => x,
+        Cell::Whole(n) => *n as f64,
+        Cell::Real(x) => *x,
+        // Tables with texts are not written as numbers.
+        Cell::Text(_) => f64::NAN,
     }
 }
 
@@ -127,10 +133,22 @@ mod tests {
     }
 
     #[test]
+    fn texts_are_quoted_where_they_must_be() {
+        for (text, as_csv, as_json) in
+            [("a b", "a b", "\"a b\""), ("a,b", "\"a,b\"", "\"a,b\""), ("6\"\n", "\"6\"\"\n\"", "\"6\\\"\\n\"")]
+        {
+            let (mut a, mut b) = (Vec::new(), Vec::new());
+            csv(&Cell::Text(text.into()), &mut a);
+            json(&Cell::Text(text.into()), &mut b);
+            assert_eq!([a, b].map(|x| String::from_utf8(x).unwrap()), [as_csv, as_json]);
+        }
+    }
+
+    #[test]
     fn numbers_read_back_exactly() {
         for x in [1e300, -5e-324, 1e16, 123456789.125, f64::from(0.1_f32), f64::MAX] {
             let mut out = Vec::new();
-            csv(Cell::Real(x), &mut out);
+            csv(&Cell::Real(x), &mut out);
             let text = String::from_utf8(out).unwrap();
             assert_eq!(text.parse(), Ok(x), "{text}");
             assert!(text.len() < 26, "{text}");
