@@ -49,7 +49,8 @@ pub(super) fn bodies(
         Mode::Lines => indices.as_chunks::<2>().0.iter().for_each(|&line| bodies.rod(line)),
         _ => {
             indices.windows(2).for_each(|w| bodies.rod([w[0], w[1]]));
-            if let (Mode::LineLoop, [first, .., last]) = (mode, indices) {
+            // Between two vertices the way back is the way there.
+            if let (Mode::LineLoop, [first, _, .., last]) = (mode, indices) {
                 bodies.rod([*last, *first]);
             }
         }
@@ -166,6 +167,7 @@ mod tests {
             (Mode::Lines, &[0, 1, 0, 2][..], 2),
             (Mode::LineStrip, &[0, 1, 2][..], 2),
             (Mode::LineLoop, &[0, 1, 2][..], 3),
+            (Mode::LineLoop, &[0, 1][..], 1),
         ] {
             let mesh = made(mode, indices);
             let (each, six) = if mode == Mode::Points { (32, 0.01) } else { (28, 0.5) };
