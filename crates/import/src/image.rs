@@ -72,6 +72,11 @@ pub fn decode_all(sources: &[Encoded<'_>], limits: &Limits) -> Vec<Result<ImageD
     sources.par_iter().zip(fits).map(|(s, fits)| fits.and_then(|()| decode(s.bytes, s.name, limits))).collect()
 }
 
+/// How wide and high an image is, from its header alone.
+pub(crate) fn size(bytes: &[u8], limits: &Limits) -> Result<[u32; 2], ErrorKind> {
+    Size::of(bytes, limits).map(|size| [size.width, size.height])
+}
+
 /// A white pixel, in place of an image that cannot be read: the factors of the material show instead.
 #[must_use]
 pub fn placeholder(name: &str) -> ImageDesc {

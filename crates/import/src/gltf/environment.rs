@@ -13,7 +13,7 @@ use super::source::Source;
 use super::texture;
 use crate::image::{self, Encoded};
 use crate::scene::{EnvironmentDesc, ImageDesc, Pixels};
-use crate::{ErrorKind, ImportError, Report, srgb};
+use crate::{ErrorKind, ImportError, Limits, Report, srgb};
 
 const NAME: &str = "EXT_lights_image_based";
 
@@ -40,15 +40,15 @@ fn one() -> f32 {
     1.0
 }
 
-/// The map around a scene of the file, and its image, which is to stand at `index`; `None` if the scene has no such
-/// light or, with a warning, if its images cannot be read.
+/// The map around a scene of the file, and its image, which is to stand after the others; `None` if the scene has no
+/// such light or, with a warning, if its images cannot be read.
 ///
 /// # Errors
 /// If the light or an image does not exist.
 pub(super) fn read(
     source: &Source<'_>,
     scene: Option<usize>,
-    index: usize,
+    images: &[ImageDesc],
     report: &mut Report,
 ) -> Result<Option<(EnvironmentDesc, ImageDesc)>, ImportError> {
     let others = scene.and_then(|s| source.root.scenes[s].extensions.as_ref()).map(|e| &e.others);
@@ -70,17 +70,19 @@ pub(super) fn read(
     let Some(&faces) = specular_images.first() else {
         return Err(source.invalid(place + "/specularImages", "has no images"));
     };
-    let images = source.root.images.len();
-    if let Some(bad) = faces.iter().find(|&&i| i >= images) {
-        let cause = format!("element {bad} does not exist: there are {images}");
+    let count = source.root.images.len();
+    if let Some(bad) = faces.iter().find(|&&i| i >= count) {
+        let cause = format!("element {bad} does not exist: there are {count}");
         return Err(source.invalid(place + "/specularImages/0", cause));
     }
-    match Cube::read(source, faces, report) {
+    let mut limits = *source.limits;
+    let used: u64 = images.iter().map(|i| i.pixels.bytes()).sum();
+    limits.image_bytes = limits.image_bytes.saturating_sub(used);
+    match Cube::read(source, faces, &limits, report) {
         Ok(cube) => {
-            let image = cube.unfolded(DMat3::from_quat(turn.normalize()), source.limits.image_bytes);
-            let image = image.map_err(|kind| source.at(place, kind))?;
+            let image = cube.unfolded(DMat3::from_quat(turn.normalize()));
             let scale = Vec3::splat(intensity);
-            Ok(Some((EnvironmentDesc::LatLong { image: index, rotation: 0.0, scale }, image)))
+            Ok(Some((EnvironmentDesc::LatLong { image: images.len(), rotation: 0.0, scale }, image)))
         }
         Err(e) => {
             report.warn(e.file, e.place, format!("{}: the environment is left out", e.kind));
@@ -89,6 +91,10 @@ pub(super) fn read(
     }
 }
 
+/// What the map needs for each pixel of a face, more than the radiances of all six: it has four by two of a face's
+/// sides, and twelve bytes a pixel.
+const MAP_BYTES: u64 = 4 * 2 * 12;
+
 /// Six square faces of radiances, in the order +X, -X, +Y, -Y, +Z, -Z; row 0 at the top.
 struct Cube {
     side: usize,
@@ -96,18 +102,30 @@ struct Cube {
 }
 
 impl Cube {
-    fn read(source: &Source<'_>, numbers: [usize; 6], report: &mut Report) -> Result<Self, ImportError> {
+    fn read(
+        source: &Source<'_>,
+        numbers: [usize; 6],
+        limits: &Limits,
+        report: &mut Report,
+    ) -> Result<Self, ImportError> {
         let mut bytes = Vec::new();
-        let mut limits = *source.limits;
+        let mut left = *limits;
         for index in numbers {
-            let read = texture::image_bytes(source, index, &limits, report)?;
-            limits.file_bytes = limits.file_bytes.saturating_sub(read.len() as u64);
+            let read = texture::image_bytes(source, index, &left, report)?;
+            left.file_bytes = left.file_bytes.saturating_sub(read.len() as u64);
+            let side = image::size(&read, limits).map_err(|kind| source.at(format!("/images/{index}"), kind))?;
+            let needed = MAP_BYTES * u64::from(side[0]) * u64::from(side[1]);
+            if needed > limits.image_bytes {
+                let cause =
+                    format!("the environment needs {needed} bytes; {} are left of the limit", limits.image_bytes);
+                return Err(source.at(format!("/images/{index}"), ErrorKind::Limit(cause)));
+            }
             bytes.push(read);
         }
         let encoded: Vec<Encoded<'_>> = bytes.iter().map(|bytes| Encoded { name: "", bytes }).collect();
         let mut faces = Vec::new();
         let mut side = None;
-        for (index, decoded) in numbers.into_iter().zip(image::decode_all(&encoded, source.limits)) {
+        for (index, decoded) in numbers.into_iter().zip(image::decode_all(&encoded, limits)) {
             let place = || format!("/images/{index}");
             let image = decoded.map_err(|kind| source.at(place(), kind))?;
             if image.width != image.height || *side.get_or_insert(image.width) != image.width {
@@ -120,12 +138,8 @@ impl Cube {
     }
 
     /// The map by longitude and latitude of the cube turned by a rotation.
-    fn unfolded(&self, turn: DMat3, most_bytes: u64) -> Result<ImageDesc, ErrorKind> {
+    fn unfolded(&self, turn: DMat3) -> ImageDesc {
         let (width, height) = (4 * self.side, 2 * self.side);
-        let bytes = 12 * width as u64 * height as u64;
-        if bytes > most_bytes {
-            return Err(ErrorKind::Limit(format!("the environment needs {bytes} bytes, more than {most_bytes}")));
-        }
         let back = turn.transpose();
         let row = |y: usize| {
             let (sin, cos) = (std::f64::consts::PI * (y as f64 + 0.5) / height as f64).sin_cos();
@@ -136,7 +150,7 @@ impl Cube {
         };
         let pixels: Vec<[f32; 3]> = (0..height).into_par_iter().flat_map_iter(row).collect();
         let (width, height) = (width as u32, height as u32);
-        Ok(ImageDesc { name: "environment".into(), width, height, pixels: Pixels::Rgb32F(pixels.into()) })
+        ImageDesc { name: "environment".into(), width, height, pixels: Pixels::Rgb32F(pixels.into()) }
     }
 
     /// From a direction, linear between the middles of pixels of one face.

@@ -55,7 +55,7 @@ use node::Nodes;
 use source::Source;
 use texture::Textures;
 
-use crate::cache::Kept;
+use crate::cache::{Kept, Key};
 use crate::scene::{ImageDesc, SceneDesc};
 use crate::{ImportError, Imported, Options, Report, files};
 
@@ -129,7 +129,7 @@ pub(crate) fn read_bytes(bytes: &[u8], path: &Path, options: &Options) -> Result
         scene.lights.extend(camera_light::light(&source, node, world, &mut report)?);
     }
     scene.images = images(&source, textures, options, &mut report);
-    if let Some((around, image)) = environment::read(&source, shown, scene.images.len(), &mut report)? {
+    if let Some((around, image)) = environment::read(&source, shown, &scene.images, &mut report)? {
         scene.environment = Some(around);
         scene.images.push(image);
     }
@@ -139,13 +139,15 @@ pub(crate) fn read_bytes(bytes: &[u8], path: &Path, options: &Options) -> Result
 /// The decoded images: those that were kept, if there are any.
 fn images(source: &Source<'_>, textures: Textures<'_>, options: &Options, report: &mut Report) -> Vec<ImageDesc> {
     let Some(cache) = &options.images else { return textures.decode(report) };
-    if let Some(Kept { images, files }) = cache.get(source.file, textures.count()) {
-        report.files.extend(files);
-        return images;
-    }
-    let images = textures.decode(report);
-    cache.keep(source.file, Kept { images: images.clone(), files: report.files.clone() });
-    images
+    let key = Key { limits: *source.limits, images: textures.decoded() };
+    let kept = cache.get(source.file, &key).unwrap_or_else(|| {
+        let mut said = Report::default();
+        let kept = Kept { key, images: textures.decode(&mut said), report: said };
+        cache.keep(source.file, kept.clone());
+        kept
+    });
+    report.absorb(kept.report);
+    kept.images
 }
 
 /// Checks that all buffer views and accessors lie inside their buffers, also those that nothing here reads.

@@ -59,6 +59,46 @@ fn images_of_one_file_are_one() {
 }
 
 #[test]
+fn kept_images_are_those_that_a_reading_needs() {
+    let dir = tempfile::tempdir().expect("temporary folder");
+    let path = dir.path().join("made.gltf");
+    image::RgbImage::new(2, 2).save(dir.path().join("a.png")).expect("image");
+    let images = json!([{"uri": "a.png"}, {"uri": "missing.png"}]);
+    let mut document = painted(&images);
+    document["materials"][0] = json!({"occlusionTexture": {"index": 0}});
+    fs::write(&path, document.to_string()).expect("file");
+    let cache = crate::ImageCache::default();
+    let read = |without_occlusion: bool, image_bytes: u64| {
+        let limits = Limits { image_bytes, ..Limits::default() };
+        let images = Some(cache.clone());
+        let options = Options { without_occlusion, limits, images, ..Options::default() };
+        let read = super::read(&path, &options).expect("readable");
+        (read.scene.images[0].width, read.report.warnings.len(), read.report.files.len())
+    };
+    // The image that is not there is warned of each time; the other one is a pixel where it is not decoded.
+    assert_eq!([read(true, 1 << 20), read(true, 1 << 20)], [(1, 1, 1); 2]);
+    assert_eq!([read(false, 1 << 20), read(false, 1 << 20)], [(2, 1, 2); 2]);
+    assert_eq!(read(false, 8), (1, 2, 2));
+}
+
+#[test]
+fn environments_share_the_limit_of_the_textures() {
+    // A texture and six faces of 24 x 24 pixels of four bytes; the map takes 96 for each pixel of a face.
+    let mut document = painted(&json!([{"uri": "a.png"}, {"uri": "b.png"}]));
+    document["materials"].as_array_mut().expect("list").truncate(1);
+    document["scenes"] = json!([{"extensions": {"EXT_lights_image_based": {"light": 0}}}]);
+    let light = json!({"specularImages": [[1, 1, 1, 1, 1, 1]]});
+    document["extensions"] = json!({"EXT_lights_image_based": {"lights": [light]}});
+    let read = |image_bytes: u64| read(&document, Limits { image_bytes, ..Limits::default() }).expect("readable");
+    let enough = 24 * 24 * (4 + 96);
+    let found = read(enough);
+    assert!(found.scene.environment.is_some(), "{:?}", found.report.warnings);
+    let tight = read(enough - 1);
+    assert!(tight.scene.environment.is_none());
+    assert!(tight.report.warnings[0].message.contains("the environment needs 55296 bytes; 55295 are left"));
+}
+
+#[test]
 fn encoded_images_are_limited_together() {
     // Other spellings of a path are other files to the reader.
     let images = json!([{"uri": "a.png"}, {"uri": "b.png"}, {"uri": "./a.png"}, {"uri": "./b.png"}]);

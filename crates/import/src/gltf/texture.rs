@@ -12,6 +12,7 @@ use serde_json::{Map, Value};
 
 use super::json;
 use super::source::Source;
+use crate::cache::Shown;
 use crate::image::{self, Encoded};
 use crate::scene::{Channel, Filter, ImageDesc, TextureRef, Wrap};
 use crate::{ImportError, Limits, Report};
@@ -25,15 +26,6 @@ pub(super) struct Textures<'a> {
     used: Vec<Shown>,
     /// For each of them whether it has to be decoded.
     wanted: Vec<bool>,
-}
-
-/// What a texture shows, by numbers in the file.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Shown {
-    /// An image.
-    Image(usize),
-    /// Nothing that can be read.
-    Nothing { texture: usize },
 }
 
 /// What the different kinds of texture references of a material have in common.
@@ -111,9 +103,9 @@ impl<'a> Textures<'a> {
         })
     }
 
-    /// How many images are used.
-    pub(super) fn count(&self) -> usize {
-        self.used.len()
+    /// What is used, and whether it has to be decoded.
+    pub(super) fn decoded(&self) -> Vec<(Shown, bool)> {
+        self.used.iter().copied().zip(self.wanted.iter().copied()).collect()
     }
 
     /// Decodes the images that are used, in parallel. One that cannot be read is replaced, with a warning.
