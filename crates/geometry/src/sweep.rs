@@ -4,7 +4,6 @@ use glam::DVec3;
 
 use crate::Ray;
 use crate::distance::closest_on_triangle;
-use crate::quadratic::roots;
 
 /// Where a moving sphere first touches.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,12 +67,12 @@ pub fn sphere_to_triangle(ray: &Ray<f64>, radius: f64, corners: [DVec3; 3]) -> O
     let square = radius * radius;
     for [p, q] in [[a, b], [b, c], [c, a]] {
         // A corner, and the cylinder about the edge that begins there.
-        if let Some([s, _]) = roots(dd, -d.dot(p), p.dot(p) - square) {
+        if let Some(s) = entry(d, p, square) {
             offer(s, p);
         }
         let e = (q - p).normalize_or_zero();
         let (across, off) = (d - e * d.dot(e), p - e * p.dot(e));
-        if let Some([s, _]) = roots(across.dot(across), -across.dot(off), off.dot(off) - square) {
+        if let Some(s) = entry(across, off, square) {
             let along = e.dot(d * s - p);
             if along >= 0.0 && along <= p.distance(q) {
                 offer(s, p + e * along);
@@ -83,6 +82,16 @@ pub fn sphere_to_triangle(ray: &Ray<f64>, radius: f64, corners: [DVec3; 3]) -> O
     let (s, point) = best?;
     let t = base + s;
     ray.contains(t).then_some(Touch { t, point: at + point })
+}
+
+/// When a point that moves from the origin comes as near to `p` as the root of `square`. From the nearest point of its line,
+/// so that a radius far smaller than the way is not lost in squares of that.
+fn entry(d: DVec3, p: DVec3, square: f64) -> Option<f64> {
+    let dd = d.dot(d);
+    let nearest = p.dot(d) / dd;
+    let within = square - (p - d * nearest).length_squared();
+    // False also for a point that does not move.
+    (within >= 0.0).then(|| nearest - (within / dd).sqrt())
 }
 
 /// The unit normal and a point of the plane, where it is not too thin to tell.
