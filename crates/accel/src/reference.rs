@@ -154,7 +154,7 @@ pub fn nearest_k(scene: &Scene, point: DVec3, count: usize, radius: f64) -> Vec<
     for (id, corners) in placed(scene, point) {
         let at = closest_on_triangle::<f64>(corners, DVec3::ZERO);
         let squared = at.point.length_squared();
-        if squared <= radius * radius {
+        if squared.sqrt() <= radius {
             let [a, b, c] = corners;
             let (distance, [_, u, v]) = (at.point.length(), at.weights.map(|w| w as f32));
             let (point, feature, normal_direction) = (point + at.point, at.feature(), (b - a).cross(c - a));

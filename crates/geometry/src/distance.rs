@@ -93,8 +93,12 @@ pub fn closest_on_triangle<R: Real>([a, b, c]: [R::Vec3; 3], p: R::Vec3) -> Clos
     let n = e.cross(f);
     let area = n.dot(n);
     let (v, w) = (n.dot(q.cross(f)) / area, n.dot(e.cross(q)) / area);
-    if v >= R::ZERO && w >= R::ZERO && v + w <= R::ONE {
-        return ClosestPoint { point: a + ab * v + ac * w, weights: [R::ONE - v - w, v, w] };
+    let inside = v >= R::ZERO && w >= R::ZERO && v + w <= R::ONE;
+    let foot = ClosestPoint { point: a + ab * v + ac * w, weights: [R::ONE - v - w, v, w] };
+    // Of a sliver the area is mostly rounding, and the foot may be anywhere in it: then the edges are asked too.
+    let sliver = area <= e.dot(e) * f.dot(f) * R::UNIT_ROUNDOFF;
+    if inside && !sliver {
+        return foot;
     }
     let edge = |from: R::Vec3, to: R::Vec3, order: [usize; 3]| {
         let turned = precedes::<R>(to, from);
@@ -106,10 +110,10 @@ pub fn closest_on_triangle<R: Real>([a, b, c]: [R::Vec3; 3], p: R::Vec3) -> Clos
         (squared_distance::<R>(on_edge.point, p), ClosestPoint { weights, ..on_edge })
     };
     let first = edge(a, b, [0, 1, 2]);
-    [edge(b, c, [1, 2, 0]), edge(c, a, [2, 0, 1])]
+    let best = [edge(b, c, [1, 2, 0]), edge(c, a, [2, 0, 1])]
         .into_iter()
-        .fold(first, |best, other| if other.0 < best.0 { other } else { best })
-        .1
+        .fold(first, |best, other| if other.0 < best.0 { other } else { best });
+    if inside && squared_distance::<R>(foot.point, p) < best.0 { foot } else { best.1 }
 }
 
 /// Distance of a point from a triangle, in world units.
@@ -303,6 +307,21 @@ mod tests {
             let exact = distance_to_triangle::<f64>(v32.map(|x| x.as_dvec3()), p.as_vec3().as_dvec3());
             let got = f64::from(distance_to_triangle::<f32>(v32, p.as_vec3()));
             prop_assert!((got - exact).abs() < 1e-4, "{got} {exact}");
+        }
+
+        /// Slivers down to those whose area is nothing but rounding.
+        #[test]
+        fn nothing_of_a_sliver_is_nearer(
+            a in point(), b in point(), off in point(), p in point(), at in -0.5..1.5f64, thin in 0..20i32,
+        ) {
+            let c = a.lerp(b, at) + off * 10f64.powi(-thin);
+            let distance = distance_to_triangle::<f64>([a, b, c], p);
+            for i in 0..=64 {
+                for (from, to) in [(a, b), (b, c), (c, a)] {
+                    let q = from.lerp(to, f64::from(i) / 64.0);
+                    prop_assert!(q.distance(p) >= distance - 1e-12, "{} {}", q.distance(p), distance);
+                }
+            }
         }
 
         /// Triangles that share an edge agree about its nearest point, to the bit.

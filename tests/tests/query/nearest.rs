@@ -71,6 +71,8 @@ proptest! {
                 same(&scene.closest_point(*p), &expected)?;
                 same(&batch, &expected)?;
                 let distance = expected.map_or(f64::INFINITY, |e| e.distance);
+                // The ball is closed.
+                same(&scene.closest_point_within(*p, distance), &expected)?;
                 prop_assert!(scene.distance(*p) == distance || !p.is_finite() && scene.distance(*p).is_nan());
                 // Of the same arithmetic for what is in the ball and what is not.
                 let near = reference::nearest_k(&scene, *p, count, radius);

@@ -55,6 +55,11 @@ impl Keep for Nearest {
     }
 }
 
+/// The square of a radius, not too small; what is found within has still to be compared by its distance.
+pub(super) fn within(radius: f64) -> f64 {
+    radius * radius * (1.0 + 4.0 * f64::EPSILON)
+}
+
 /// Instance and number of the triangle that is nearest to the last point: the next point's may not be far from it.
 type Last = Option<(u32, u32)>;
 
@@ -149,7 +154,7 @@ impl Scene {
         if !(point.is_finite() && radius >= 0.0) {
             return None;
         }
-        let mut keep = Nearest { limit: radius * radius, best: None };
+        let mut keep = Nearest { limit: within(radius), best: None };
         if let Some((instance, number)) = *last {
             self.inner().measure(point, instance, number, &mut keep);
         }
@@ -157,7 +162,7 @@ impl Scene {
         if let Some(best) = &keep.best {
             *last = Some((best.instance, best.number));
         }
-        keep.best
+        keep.best.filter(|near| near.squared.sqrt() <= radius)
     }
 
     /// What users get of it.

@@ -4,6 +4,7 @@ use std::collections::BinaryHeap;
 
 use glam::DVec3;
 
+use super::closest_point::within;
 use crate::nearest::{Keep, Near};
 use crate::{ClosestPoint, Scene};
 
@@ -72,8 +73,10 @@ impl Scene {
         if count == 0 || !(point.is_finite() && radius >= 0.0) {
             return Vec::new();
         }
-        let mut keep = Few { count, limit: radius * radius, heap: BinaryHeap::new() };
+        let mut keep = Few { count, limit: within(radius), heap: BinaryHeap::new() };
         self.inner().near(point, &mut keep);
-        keep.heap.into_sorted_vec().iter().filter_map(|near| self.closest(point, &near.0)).collect()
+        let near = keep.heap.into_sorted_vec();
+        let inside = near.iter().filter(|near| near.0.squared.sqrt() <= radius);
+        inside.filter_map(|near| self.closest(point, &near.0)).collect()
     }
 }
