@@ -1,6 +1,9 @@
 //! What moves, at several moments at once, so that one camera fits them all.
 
+use std::collections::HashSet;
+
 use firsthit_import::SceneDesc;
+use firsthit_import::scene::InstanceDesc;
 
 /// A scene with everything that is somewhere in one of the poses of a scene: what stands still is in it once. Materials,
 /// lights and all else are those of the first pose.
@@ -10,6 +13,7 @@ pub fn all_poses(poses: impl IntoIterator<Item = SceneDesc>) -> SceneDesc {
     let Some(mut all) = poses.next() else { return SceneDesc::default() };
     // What each mesh of the pose before is in the scene: most stay as they are.
     let mut known: Vec<usize> = (0..all.meshes.len()).collect();
+    let mut there: HashSet<_> = all.instances.iter().map(key).collect();
     for pose in poses {
         let mut now = Vec::with_capacity(pose.meshes.len());
         for (i, mesh) in pose.meshes.into_iter().enumerate() {
@@ -23,15 +27,19 @@ pub fn all_poses(poses: impl IntoIterator<Item = SceneDesc>) -> SceneDesc {
         }
         for mut instance in pose.instances {
             instance.mesh = now[instance.mesh];
-            let there =
-                |i: &firsthit_import::scene::InstanceDesc| (i.mesh, i.transform) == (instance.mesh, instance.transform);
-            if !all.instances.iter().any(there) {
+            if there.insert(key(&instance)) {
                 all.instances.push(instance);
             }
         }
         known = now;
     }
     all
+}
+
+/// What is equal for instances that look the same: the mesh and the bits of the transform.
+fn key(instance: &InstanceDesc) -> (usize, [u64; 12]) {
+    // -0 and 0 are one number.
+    (instance.mesh, instance.transform.to_cols_array().map(|x| (x + 0.0).to_bits()))
 }
 
 #[cfg(test)]
@@ -68,5 +76,22 @@ mod tests {
         let places: Vec<_> = all.instances.iter().map(|i| (i.mesh, i.transform.translation.x)).collect();
         assert_eq!(places, [(0, 0.0), (1, 0.0), (1, 2.0), (2, 2.0)]);
         assert_eq!(all.meshes.len(), 3);
+    }
+
+    #[test]
+    fn many_instances_are_compared_once() {
+        // 80,000 in each of two poses, of which one moves. Each against all others would be billions of comparisons.
+        let count = 80_000;
+        let many = |x: f64| {
+            let mut pose = pose(1.0, x);
+            let still = pose.instances[0].clone();
+            pose.instances.extend((0..count).map(|k| InstanceDesc {
+                transform: DAffine3::from_translation(DVec3::Y * f64::from(k + 1)),
+                ..still.clone()
+            }));
+            pose
+        };
+        let all = all_poses([many(0.0), many(-0.0), many(2.0)]);
+        assert_eq!(all.instances.len(), count as usize + 3);
     }
 }
