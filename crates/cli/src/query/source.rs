@@ -14,6 +14,9 @@ use crate::error::Failure;
 /// The longest line that is read.
 const MOST_LINE: u64 = 1 << 16;
 
+/// A block of lines ends after so many bytes: long lines are not to fill the memory.
+const BLOCK_BYTES: usize = 1 << 24;
+
 /// What some programs put before a text.
 const MARK: &str = "\u{feff}";
 
@@ -121,7 +124,7 @@ impl<const N: usize> Source<N> {
         }
     }
 
-    /// Reads at most so many rows; none: that was the end.
+    /// Reads at most so many rows, fewer of long lines; none: that was the end.
     pub(crate) fn read(&mut self, most: usize, rows: &mut Vec<[f64; N]>) -> Result<(), Failure> {
         rows.clear();
         match self.kind {
@@ -147,9 +150,9 @@ impl<const N: usize> Source<N> {
 
     /// The next lines with something on them, by number and place in the buffer. They are text.
     fn lines(&mut self, notation: Notation, most: usize) -> Result<Vec<(u64, Range<usize>)>, Failure> {
-        let mut lines = Vec::with_capacity(most);
+        let mut lines = Vec::new();
         self.buffer.clear();
-        while lines.len() < most {
+        while lines.len() < most && self.buffer.len() < BLOCK_BYTES {
             let start = self.buffer.len();
             let read = (&mut self.input).take(MOST_LINE).read_until(b'\n', &mut self.buffer);
             match read.map_err(|e| self.failed(&e))? {
@@ -223,4 +226,31 @@ impl<const N: usize> Source<N> {
 fn text<'a>(buffer: &'a [u8], line: &Range<usize>) -> Option<&'a str> {
     let text = str::from_utf8(buffer.get(line.clone())?).ok()?;
     Some(text.strip_prefix(MARK).unwrap_or(text))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PAIRS: Columns<2> = Columns { noun: "pair", names: ["a", "b"], least: 2, defaults: [0.0; 2] };
+
+    #[test]
+    fn blocks_of_long_lines_end_by_bytes() {
+        // 600 lines of nearly the longest: more than two blocks.
+        let line = format!("1,2{}\n", " ".repeat(MOST_LINE as usize - 10));
+        let text = line.repeat(600);
+        let mut source = Source::new("text".into(), Box::new(io::Cursor::new(text.into_bytes())), &PAIRS).unwrap();
+        let (mut rows, mut blocks, mut all) = (Vec::new(), 0, 0);
+        loop {
+            source.read(1 << 16, &mut rows).unwrap();
+            assert!(source.buffer.len() < BLOCK_BYTES + MOST_LINE as usize);
+            if rows.is_empty() {
+                break;
+            }
+            assert!(rows.iter().all(|&row| row == [1.0, 2.0]));
+            blocks += 1;
+            all += rows.len();
+        }
+        assert_eq!((blocks, all), (3, 600));
+    }
 }
