@@ -254,7 +254,8 @@ def load(
     variant: str | None = None,
     threads: int = 0,
 ) -> Scene:
-    """Reads a model or scene file: .obj (.obj.zst, .obj.gz), .gltf, .glb, .toml, .json.
+    """Reads a model or scene file: .gltf, .glb, .obj, .ply, .stl, .toml, .json; .obj, .ply and .stl also
+    compressed (.obj.zst, .obj.gz).
 
     ``up``: the file's upward axis (``"+Z"``), which becomes +Y; by default what the format says. Such a scene is
     pickled as the path of its file.
