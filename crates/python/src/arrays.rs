@@ -3,7 +3,6 @@
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use pyo3::types::PyDict;
 
 use crate::error;
 
@@ -36,7 +35,7 @@ impl<'py> Floats<'py> {
         if let Some(floats) = Self::in_place(object) {
             return Ok(floats);
         }
-        let array = numpy(object.py(), "asarray", object, "float64")?;
+        let array = required(object, "float64")?;
         Self::in_place(&array).ok_or_else(|| error::value("this is no array of numbers"))
     }
 
@@ -50,8 +49,8 @@ impl<'py> Floats<'py> {
 
     fn is_in_order(&self) -> bool {
         match self {
-            Self::Narrow(array) => array.is_c_contiguous() && array.is_aligned(),
-            Self::Wide(array) => array.is_c_contiguous() && array.is_aligned(),
+            Self::Narrow(array) => array.is_aligned() && array.as_slice().is_ok(),
+            Self::Wide(array) => array.is_aligned() && array.as_slice().is_ok(),
         }
     }
 
@@ -98,11 +97,12 @@ pub(crate) fn triangles(object: &Bound<'_, PyAny>) -> PyResult<Vec<[u32; 3]>> {
     }
     if let Ok(indices) = array.cast::<PyArrayDyn<u32>>()
         && indices.is_c_contiguous()
+        && indices.is_aligned()
         && let Ok(indices) = indices.try_readonly()
     {
-        return Ok(indices.as_slice().unwrap_or_default().as_chunks::<3>().0.to_vec());
+        return Ok(indices.as_slice().map_err(error::value)?.as_chunks::<3>().0.to_vec());
     }
-    let array = numpy(py, "asarray", &array, "int64")?;
+    let array = required(&array, "int64")?;
     let indices = array.cast::<PyArrayDyn<i64>>().map_err(PyErr::from)?.try_readonly().map_err(error::value)?;
     let indices = indices.as_slice().map_err(error::value)?.as_chunks::<3>().0;
     let index = |triangle: usize, index: i64| {
@@ -118,10 +118,7 @@ pub(crate) fn module(py: Python<'_>) -> PyResult<&Bound<'_, PyAny>> {
     Ok(NUMPY.get_or_try_init(py, || py.import("numpy").map(|m| m.into_any().unbind()))?.bind(py))
 }
 
-/// `numpy.FUNCTION(object, dtype=DTYPE, order="C")`
-fn numpy<'py>(py: Python<'py>, function: &str, object: &Bound<'py, PyAny>, dtype: &str) -> PyResult<Bound<'py, PyAny>> {
-    let how = PyDict::new(py);
-    how.set_item("dtype", dtype)?;
-    how.set_item("order", "C")?;
-    module(py)?.call_method(function, (object,), Some(&how))
+/// An array in order and aligned, as fields of packed records need not be: `numpy.require(object, dtype, ["C", "A"])`.
+fn required<'py>(object: &Bound<'py, PyAny>, dtype: &str) -> PyResult<Bound<'py, PyAny>> {
+    module(object.py())?.call_method1("require", (object, dtype, ["C", "A"]))
 }

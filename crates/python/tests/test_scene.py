@@ -1,6 +1,8 @@
 """What scenes are made of, and what is refused."""
 
+import os
 import pickle
+import time
 
 import numpy as np
 import pytest
@@ -29,6 +31,40 @@ def test_strided_arrays(spot):
     narrow = rays.astype("f4")
     assert np.array_equal(a.closest_hit(narrow).t_hit, a.closest_hit(narrow.astype("f8")).t_hit)
     assert np.array_equal(a.closest_hit(rays[::2]).t_hit, a.closest_hit(rays).t_hit[::2])
+
+
+def packed(numbers, dtype):
+    """The same array as a field of records of odd size: nothing in it is aligned."""
+    numbers = np.asarray(numbers, dtype)
+    records = np.zeros(len(numbers), np.dtype([("tag", "u1"), ("numbers", dtype, numbers.shape[1:])]))
+    records["numbers"] = numbers
+    assert not records["numbers"].flags.aligned
+    return records["numbers"]
+
+
+@pytest.mark.parametrize("dtype", ["int32", "int64", "uint32"])
+@pytest.mark.parametrize("floats", ["float32", "float64"])
+def test_unaligned_arrays(dtype, floats):
+    scene = firsthit.Scene(packed(TRIANGLE[0], floats), packed(TRIANGLE[1], dtype))
+    assert scene.closest_hit(packed([[0.25, 0.25, 5]], floats), packed([[0, 0, -1]], floats)).t_hit == 5
+    # In order, but from an odd byte on.
+    whole = np.zeros(1 + 3 * np.dtype(dtype).itemsize, "u1")[1:].view(dtype).reshape(1, 3)
+    whole[:] = TRIANGLE[1]
+    assert whole.flags.c_contiguous and not whole.flags.aligned
+    assert firsthit.Scene(TRIANGLE[0], whole).stats["stored_triangles"] == 1
+
+
+@pytest.mark.skipif(not os.path.isdir("/proc/self/task"), reason="threads are counted by Linux")
+def test_few_pools_are_kept():
+    scene = firsthit.Scene(*TRIANGLE)
+    before = len(os.listdir("/proc/self/task"))
+    for threads in range(11, 41):
+        assert scene.closest_hit(np.tile([0.25, 0.25, 5, 0, 0, -1.0], (5000, 1)), threads=threads).hit.all()
+    # Threads take a moment to end. Three pools are left.
+    deadline = time.monotonic() + 20
+    while (kept := len(os.listdir("/proc/self/task")) - before) > 38 + 39 + 40 and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert kept <= 38 + 39 + 40
 
 
 def test_objects_with_triangles(spot):
