@@ -210,15 +210,10 @@ fn what_cannot_be_opened_is_told_with_what_to_do() {
     assert!(matches!(e.kind, ErrorKind::Io(_)) && e.to_string().contains("none.toml"), "{e}");
     let e = failure(at("none.xyz"));
     assert!(matches!(e.kind, ErrorKind::Io(_)), "a file that is not there is told as that: {e}");
-    fs::write(at("a.ply"), "ply").expect("file");
-    let e = failure(at("a.ply")).to_string();
-    assert!(
-        e.ends_with(
-            "'.ply' files are not read; firsthit reads .obj (also .obj.zst and .obj.gz), .gltf, .glb, \
-         and scene files (.toml, .json)"
-        ),
-        "{e}"
-    );
+    fs::write(at("a.fbx"), "Kaydara").expect("file");
+    let e = failure(at("a.fbx")).to_string();
+    assert!(e.contains("'.fbx' files are not read; firsthit reads .obj") && e.contains(".gltf, .glb"), "{e}");
+    assert!(e.contains(".ply") && e.contains(".stl") && e.contains("scene files (.toml, .json)"), "{e}");
     fs::write(at("noname"), "").expect("file");
     assert!(failure(at("noname")).to_string().contains("the file name has no extension"));
 
