@@ -72,7 +72,7 @@ proptest! {
             for (at, to) in &changes {
                 let at = at.index(hostile.len() / 4) * 4;
                 // Small numbers are more likely to mean something.
-                let to = if to % 3 == 0 { *to } else { to % 64 | (to & 0x8000_0000) };
+                let to = if to % 3 == 0 { *to } else { (to % 64) | (to & 0x8000_0000) };
                 hostile[at..at + 4].copy_from_slice(&to.to_le_bytes());
             }
             if let Ok(other) = builder.clone().build_with_trees(&signed(hostile)) {
