@@ -49,8 +49,8 @@ impl<'py> Floats<'py> {
 
     fn is_in_order(&self) -> bool {
         match self {
-            Self::Narrow(array) => array.is_aligned() && array.as_slice().is_ok(),
-            Self::Wide(array) => array.is_aligned() && array.as_slice().is_ok(),
+            Self::Narrow(array) => array.is_aligned() && array.is_c_contiguous(),
+            Self::Wide(array) => array.is_aligned() && array.is_c_contiguous(),
         }
     }
 
