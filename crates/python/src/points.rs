@@ -4,6 +4,7 @@ use std::sync::{Arc, PoisonError};
 
 use firsthit_accel::{SignMethod, Solid};
 use glam::DVec3;
+use numpy::Element;
 use pyo3::prelude::*;
 
 use crate::error;
@@ -102,11 +103,7 @@ pub(crate) fn signed_distance<'py>(
     sign: &str,
     threads: usize,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let points = Points::new(points)?;
-    let solid = solid(scene, py, sign, threads)?;
-    let part = points.part();
-    let answer = |points: &[DVec3], distances: &mut [f64]| solid.signed_distances(points, distances);
-    each(py, &points.shape, |i| part.vector(i), threads, answer)
+    of_solid(scene, py, points, sign, threads, Solid::signed_distances)
 }
 
 pub(crate) fn contains<'py>(
@@ -116,11 +113,7 @@ pub(crate) fn contains<'py>(
     sign: &str,
     threads: usize,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let points = Points::new(points)?;
-    let solid = solid(scene, py, sign, threads)?;
-    let part = points.part();
-    let answer = |points: &[DVec3], inside: &mut [bool]| solid.contains_each(points, inside);
-    each(py, &points.shape, |i| part.vector(i), threads, answer)
+    of_solid(scene, py, points, sign, threads, Solid::contains_each)
 }
 
 pub(crate) fn winding_number<'py>(
@@ -130,11 +123,30 @@ pub(crate) fn winding_number<'py>(
     sign: &str,
     threads: usize,
 ) -> PyResult<Bound<'py, PyAny>> {
+    of_solid(scene, py, points, sign, threads, |solid: &Solid, points: &[DVec3], numbers: &mut [f64]| {
+        points.iter().zip(numbers).for_each(|(point, number)| *number = solid.winding_number(*point));
+    })
+}
+
+/// What the body answers for each point.
+fn of_solid<'py, T: Element + Copy + Default + Send>(
+    scene: &Scene,
+    py: Python<'py>,
+    points: &Bound<'py, PyAny>,
+    sign: &str,
+    threads: usize,
+    answer: impl Fn(&Solid, &[DVec3], &mut [T]) + Sync,
+) -> PyResult<Bound<'py, PyAny>> {
     let points = Points::new(points)?;
     let solid = solid(scene, py, sign, threads)?;
     let part = points.part();
-    let answer = |points: &[DVec3], numbers: &mut [f64]| {
-        points.iter().zip(numbers).for_each(|(point, number)| *number = solid.winding_number(*point));
-    };
-    each(py, &points.shape, |i| part.vector(i), threads, answer)
+    each(
+        py,
+        &points.shape,
+        |i| part.vector(i),
+        threads,
+        |points: &[DVec3], answers: &mut [T]| {
+            answer(&solid, points, answers);
+        },
+    )
 }
