@@ -11,5 +11,6 @@ fi
 # Versions are those that the package was tested with.
 "$environment/bin/pip" install --quiet --disable-pip-version-check -r tests/requirements.txt
 export VIRTUAL_ENV="$environment" PATH="$environment/bin:$PATH"
-maturin develop --release --quiet
+# Beside a build of the workspace, as in .ci/run, the feature saves compiling firsthit a second time.
+maturin develop --release --quiet --features as-in-workspace
 python -m pytest -q tests "$@"
