@@ -1,8 +1,13 @@
 //! Gathering what a scene is made of.
 
+use core::ops::ControlFlow;
+use std::sync::Arc;
+
 use firsthit_geometry::Shape;
 use glam::{DAffine3, Vec3};
 
+use crate::groups::Groups;
+use crate::instance::Placed;
 use crate::{BuildError, BuildOptions, Scene};
 
 /// A part of a mesh.
@@ -25,7 +30,9 @@ pub enum Geometry {
 pub struct SceneBuilder {
     options: BuildOptions,
     meshes: Vec<Vec<Geometry>>,
-    instances: Vec<(usize, DAffine3)>,
+    instances: Vec<Placed>,
+    groups: Groups,
+    error: Option<BuildError>,
 }
 
 impl SceneBuilder {
@@ -57,12 +64,42 @@ impl SceneBuilder {
 
     /// Places a mesh in the world; the answer is the `instance` of its hits.
     pub fn add_instance(&mut self, mesh: usize, transform: DAffine3) -> usize {
-        self.instances.push((mesh, transform));
+        self.instances.push(Placed::new(mesh, transform));
         self.instances.len() - 1
     }
 
-    pub(crate) fn into_parts(self) -> (BuildOptions, Vec<Vec<Geometry>>, Vec<(usize, DAffine3)>) {
-        (self.options, self.meshes, self.instances)
+    /// Says to which groups an instance belongs, one bit each: [`Scene::seen_by`] asks about some of them. All instances
+    /// belong to all groups at first; one that belongs to none is met by no query.
+    ///
+    /// An instance that does not exist is an error of [`SceneBuilder::build`].
+    pub fn set_mask(&mut self, instance: usize, mask: u32) {
+        let count = self.instances.len();
+        match self.instances.get_mut(instance) {
+            Some(placed) => placed.mask = mask,
+            None => {
+                self.error.get_or_insert(BuildError::NoSuchInstance { instance, count });
+            }
+        }
+    }
+
+    pub(crate) fn placed(&self) -> &[Placed] {
+        &self.instances
+    }
+
+    pub(crate) fn placed_mut(&mut self) -> &mut Vec<Placed> {
+        &mut self.instances
+    }
+
+    pub(crate) fn groups_mut(&mut self) -> &mut Groups {
+        &mut self.groups
+    }
+
+    pub(crate) fn into_parts(self) -> Result<Parts, BuildError> {
+        if let Some(error) = self.error.or(self.groups.error().cloned()) {
+            return Err(error);
+        }
+        let Self { options, meshes, instances, groups, .. } = self;
+        Ok(Parts { options, meshes, instances, groups: Arc::new(groups) })
     }
 
     /// Builds one tree for each mesh and one over the instances, on the threads of the rayon pool it is called from.
@@ -70,8 +107,39 @@ impl SceneBuilder {
     /// # Errors
     /// When a vertex, index or transform is unusable: see [`BuildError`].
     pub fn build(self) -> Result<Scene, BuildError> {
-        Scene::new(self.options, &self.meshes, self.instances)
+        let Parts { options, meshes, instances, groups } = self.into_parts()?;
+        Scene::new(options, &meshes, instances, groups, None)
     }
+
+    /// The same, watched: `watch` is told now and then, by any thread, which part of the work is done, from 0 to 1. If it
+    /// breaks, the build is given up (what a thread has begun it finishes: of a large mesh, up to two thirds of its work).
+    ///
+    /// ```
+    /// use core::ops::ControlFlow;
+    /// use firsthit_accel::{BuildError, Geometry, SceneBuilder};
+    /// use glam::Vec3;
+    /// let mut builder = SceneBuilder::default();
+    /// let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y];
+    /// builder.add_mesh(vec![Geometry::Triangles { positions, triangles: vec![[0, 1, 2]] }]);
+    /// assert!(builder.clone().build_watched(&|done| { eprint!("\r{:3.0} %", 100.0 * done); ControlFlow::Continue(()) }).is_ok());
+    /// let cancelled = builder.build_watched(&|_| ControlFlow::Break(()));
+    /// assert_eq!(cancelled.unwrap_err(), BuildError::Cancelled);
+    /// ```
+    ///
+    /// # Errors
+    /// As [`SceneBuilder::build`], and [`BuildError::Cancelled`].
+    pub fn build_watched(self, watch: &(dyn Fn(f64) -> ControlFlow<()> + Sync)) -> Result<Scene, BuildError> {
+        let Parts { options, meshes, instances, groups } = self.into_parts()?;
+        Scene::new(options, &meshes, instances, groups, Some(watch))
+    }
+}
+
+/// What a builder has gathered.
+pub(crate) struct Parts {
+    pub(crate) options: BuildOptions,
+    pub(crate) meshes: Vec<Vec<Geometry>>,
+    pub(crate) instances: Vec<Placed>,
+    pub(crate) groups: Arc<Groups>,
 }
 
 /// The parts of a mesh of a file.

@@ -44,6 +44,25 @@ pub enum BuildError {
         /// Index of the instance.
         instance: usize,
     },
+    /// A mask or an update names an instance that is not there.
+    #[error("instance {instance} does not exist (there are {count})")]
+    NoSuchInstance {
+        /// The instance that is named.
+        instance: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// A group is placed, or is part of another one, that is not there (yet).
+    #[error("group {group} does not exist (there are {count})")]
+    NoSuchGroup {
+        /// The group that is named.
+        group: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// Whoever watched it had enough.
+    #[error("the build was cancelled")]
+    Cancelled,
     /// More elements than indices can count.
     #[error("{what}: {count} are more than the {limit} that can be indexed")]
     TooMany {

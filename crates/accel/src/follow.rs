@@ -1,6 +1,5 @@
 //! The frames of an animation: the trees of one frame from those of the frame before.
 
-use std::fmt;
 use std::sync::Arc;
 
 use firsthit_import::SceneDesc;
@@ -8,29 +7,10 @@ use firsthit_import::scene::{MeshDesc, SurfaceDesc};
 use rayon::prelude::*;
 
 use crate::builder::geometries;
+use crate::instance::Placed;
 use crate::model::Model;
+use crate::renew::{self, Followed, Step};
 use crate::{BuildError, Scene};
-
-/// What was done with the meshes of a scene to follow another one.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Followed {
-    /// Meshes that are as before: their trees are shared.
-    pub kept: usize,
-    /// Meshes whose tree kept its shape and got new boxes.
-    pub refitted: usize,
-    /// Meshes whose tree was built anew.
-    pub built: usize,
-}
-
-impl fmt::Display for Followed {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { kept, refitted, built } = self;
-        write!(f, "trees: {kept} kept, {refitted} refitted, {built} built")
-    }
-}
-
-/// A refitted tree that costs so many times what it did when it was built is built anew.
-const MOST_GROWTH: f64 = 1.5;
 
 impl Scene {
     /// The trees of `after`, made of these ones, which are those of `before`: meshes that are the same share theirs,
@@ -72,32 +52,16 @@ impl Scene {
         let known = |i: usize| Some((self.models().get(i)?, before.meshes.get(i)?));
         let model = |(i, mesh): (usize, &MeshDesc)| match known(i) {
             Some((old, was)) if was.same_shape(mesh) => Ok((Arc::clone(old), Step::Kept)),
-            Some((old, was)) if same_triangles(was, mesh) => {
-                let parts = geometries(mesh);
-                let refit = old.refit(i, &parts, options)?;
-                // Where it had to be built anew by itself, nothing has grown.
-                if refit.growth() <= MOST_GROWTH {
-                    return Ok((Arc::new(refit), Step::Refitted));
-                }
-                Ok((Arc::new(Model::new(i, &parts, options)?), Step::Built))
-            }
+            Some((old, was)) if same_triangles(was, mesh) => renew::moved(old, i, &geometries(mesh), options),
             _ => Ok((Arc::new(Model::new(i, &geometries(mesh), options)?), Step::Built)),
         };
         let made: Vec<(Arc<Model>, Step)> =
             after.meshes.par_iter().enumerate().map(model).collect::<Result<_, BuildError>>()?;
-        let count = |step| made.iter().filter(|(_, s)| *s == step).count();
-        let followed = Followed { kept: count(Step::Kept), refitted: count(Step::Refitted), built: count(Step::Built) };
+        let followed = Followed::of(made.iter().map(|(_, step)| *step));
         let models = made.into_iter().map(|(model, _)| model).collect();
-        let placed = after.instances.iter().map(|i| (i.mesh, i.transform)).collect();
-        Ok((Self::place(options, models, placed)?, followed))
+        let placed = after.instances.iter().map(|i| Placed::new(i.mesh, i.transform)).collect();
+        Ok((Self::place(options, models, placed, self.mask(), Arc::default())?, followed))
     }
-}
-
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Step {
-    Kept,
-    Refitted,
-    Built,
 }
 
 /// Whether two meshes differ in the places of vertices alone.

@@ -1,5 +1,7 @@
 //! Answers.
 
+use core::ops::{Add, Mul};
+
 use glam::DVec3;
 
 /// Which primitive: by the caller's (or file's) order, never the tree's.
@@ -30,6 +32,39 @@ pub struct Hit {
 }
 
 impl Hit {
+    /// Weights of the triangle's three vertices; they add up to 1. (The parameters of a shape are not weights.)
+    #[inline]
+    #[must_use]
+    pub fn weights(&self) -> [f32; 3] {
+        [1.0 - self.u - self.v, self.u, self.v]
+    }
+
+    /// What the vertices of the triangle that was hit have, at the point that was hit: normals, texture coordinates, colours, any
+    /// number or vector. `corners` are the values of its three vertices, in their order.
+    ///
+    /// ```
+    /// use firsthit_accel::{Geometry, SceneBuilder};
+    /// use firsthit_geometry::Ray;
+    /// use glam::{DAffine3, DVec3, Vec2, Vec3};
+    ///
+    /// let (positions, triangles) = (vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::X + Vec3::Y], vec![[0, 1, 2], [3, 2, 1]]);
+    /// let texture_coordinates = [Vec2::ZERO, Vec2::X, Vec2::Y, Vec2::ONE];
+    /// let mut builder = SceneBuilder::default();
+    /// let mesh = builder.add_mesh(vec![Geometry::Triangles { positions, triangles: triangles.clone() }]);
+    /// builder.add_instance(mesh, DAffine3::IDENTITY);
+    /// let hit = builder.build()?.closest_hit(&Ray::new(DVec3::new(0.75, 0.5, 2.0), DVec3::NEG_Z)).unwrap();
+    ///
+    /// let vertices = triangles[hit.id.primitive as usize];
+    /// assert_eq!(hit.interpolate(vertices.map(|i: usize| texture_coordinates[i])), Vec2::new(0.75, 0.5));
+    /// # Ok::<(), firsthit_accel::BuildError>(())
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn interpolate<T: Mul<f32, Output = T> + Add<Output = T>>(&self, [a, b, c]: [T; 3]) -> T {
+        let [of_a, of_b, of_c] = self.weights();
+        a * of_a + b * of_b + c * of_c
+    }
+
     /// Unit geometric normal in the world, by the winding of the triangle; never flipped towards the ray. Zero where there is
     /// none.
     #[inline]

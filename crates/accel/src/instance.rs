@@ -10,6 +10,22 @@ use crate::BuildError;
 use crate::local::instance_padding;
 use crate::model::Model;
 
+/// A mesh and where it is to be, as users say it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Placed {
+    pub(crate) mesh: usize,
+    pub(crate) transform: DAffine3,
+    /// Groups that it belongs to; of none it is not there for any query.
+    pub(crate) mask: u32,
+}
+
+impl Placed {
+    /// For all queries.
+    pub(crate) fn new(mesh: usize, transform: DAffine3) -> Self {
+        Self { mesh, transform, mask: u32::MAX }
+    }
+}
+
 /// A placed mesh.
 #[derive(Clone, Debug)]
 pub(crate) struct Instance {
@@ -17,15 +33,18 @@ pub(crate) struct Instance {
     pub(crate) model: u32,
     /// From the model's normalised space to the world.
     pub(crate) transform: Transform,
+    /// Whether queries meet it.
+    pub(crate) shown: bool,
 }
 
 /// So many vertices at most are transformed for tight boxes.
 const TIGHT: u64 = 1 << 24;
 
 impl Instance {
-    pub(crate) fn new(index: usize, model: usize, scale: f64, m: DAffine3) -> Result<Self, BuildError> {
-        let transform = Transform::new(m).map_err(|_| BuildError::IllConditioned { instance: index })?;
-        Ok(Self { model: model as u32, transform: transform.with_object_scale(scale) })
+    pub(crate) fn new(index: usize, placed: &Placed, scale: f64, mask: u32) -> Result<Self, BuildError> {
+        let transform = Transform::new(placed.transform).map_err(|_| BuildError::IllConditioned { instance: index })?;
+        let transform = transform.with_object_scale(scale);
+        Ok(Self { model: placed.mesh as u32, transform, shown: placed.mask & mask != 0 })
     }
 
     /// What the tree over instances holds: the model's box in the world, padded for all that is rounded on either side.
@@ -39,14 +58,16 @@ impl Instance {
 }
 
 /// Boxes in the world of what is bounded in each instance: of the vertices themselves where they are not too many in
-/// all, else of the model's box.
+/// all, else of the model's box. Empty for those that are not shown.
 pub(crate) fn tight_boxes(instances: &[Instance], models: &[Arc<Model>]) -> Vec<Aabb<f64>> {
     let all: u64 = instances.iter().map(|i| models[i.model as usize].triangle_count() * 3).sum();
     instances
         .par_iter()
         .map(|i| {
             let model = &models[i.model as usize];
-            if i.transform.is_uniform() && !model.bounds().is_empty() && !model.has_shapes() {
+            if !i.shown {
+                Aabb::empty()
+            } else if i.transform.is_uniform() && !model.bounds().is_empty() && !model.has_shapes() {
                 // Each axis is mapped by itself, so the corners tell.
                 Aabb::from_points(model.bounds().corners().map(|p| i.transform.point(p)))
             } else if all <= TIGHT {

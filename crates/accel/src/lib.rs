@@ -32,6 +32,7 @@ mod builder;
 mod error;
 #[cfg(feature = "import")]
 mod follow;
+mod groups;
 mod guards;
 mod hit;
 mod instance;
@@ -46,10 +47,12 @@ mod order;
 mod packet;
 #[allow(unsafe_code, reason = "advice to the system about memory")]
 mod pages;
+mod progress;
 mod query;
 pub mod reference;
 mod refit;
 mod region;
+mod renew;
 mod saved;
 mod scene;
 #[allow(unsafe_code, reason = "the room for instructions of the processor")]
@@ -59,21 +62,23 @@ mod solid;
 mod stats;
 mod surface_point;
 mod traverse;
+mod update;
 mod visit_order;
 mod wide;
 
 pub use build_options::{BuildOptions, BuildQuality, Layout};
 pub use builder::{Geometry, SceneBuilder};
 pub use error::BuildError;
-#[cfg(feature = "import")]
-pub use follow::Followed;
+pub use groups::Child;
 pub use guards::Guards;
 pub use hit::{Hit, HitId, SurfacePoint, TraversalCounts};
 pub use query::{ClosestPoint, Crossings, HitLists};
-pub use region::{CurveSegment, Part, Separation, SphereHit, View, VisitedTriangle, Visitor};
+pub use region::{BodyHit, CurveSegment, Part, Separation, SphereHit, View, VisitedTriangle, Visitor};
+pub use renew::Followed;
 pub use saved::SavedTreesError;
 pub use scene::{Scene, SceneStats};
 pub use simd::Level;
 pub use solid::{SignMethod, Solid};
+pub use update::SceneUpdate;
 #[doc(hidden)]
 pub use visit_order::VisitOrder;

@@ -19,6 +19,7 @@ use crate::layout::wide8::{self, Wide8};
 use crate::local::{Extent, LocalRay};
 use crate::normalise::common_scale;
 use crate::offer::{OfferTo, OfferTriangle};
+use crate::progress::Progress;
 use crate::query::{Candidate, Closest, Collect, Collector, Dyn};
 use crate::saved::TreeShape;
 use crate::simd::{self, Available, Lanes, Work};
@@ -109,7 +110,17 @@ pub(crate) enum Surface<'a> {
 impl Model {
     /// Checks and builds mesh number `mesh`.
     pub(crate) fn new(mesh: usize, geometries: &[Geometry], options: BuildOptions) -> Result<Self, BuildError> {
-        Self::make(mesh, geometries, options, None)
+        Self::watched(mesh, geometries, options, &Progress::unwatched())
+    }
+
+    /// The same as part of some work, which may be cancelled.
+    pub(crate) fn watched(
+        mesh: usize,
+        geometries: &[Geometry],
+        options: BuildOptions,
+        progress: &Progress<'_>,
+    ) -> Result<Self, BuildError> {
+        Self::make(mesh, geometries, options, None, progress)
     }
 
     /// Mesh number `mesh`, changed: a tree of the same shape with new boxes. Where that has no place for something -
@@ -122,7 +133,7 @@ impl Model {
         options: BuildOptions,
     ) -> Result<Self, BuildError> {
         self.check_same(mesh, geometries)?;
-        Self::make(mesh, geometries, options, Some(self))
+        Self::make(mesh, geometries, options, Some(self), &Progress::unwatched())
     }
 
     /// Mesh number `mesh` in a tree of this shape, which has been checked; `None` where that does not fit.
@@ -143,7 +154,7 @@ impl Model {
             }
         };
         let shape = Self { numbers, ..Self::empty(tree, 1.0, options) };
-        let model = Self::make(mesh, geometries, options, Some(&shape))?;
+        let model = Self::make(mesh, geometries, options, Some(&shape), &Progress::unwatched())?;
         // If it was built anew, there are other places.
         let same = |a: &MeshTree, b: &MeshTree| match (a, b) {
             (MeshTree::Wide { tree: a, .. }, MeshTree::Wide { tree: b, .. }) => a.root == b.root,
@@ -191,6 +202,7 @@ impl Model {
         geometries: &[Geometry],
         options: BuildOptions,
         old: Option<&Self>,
+        progress: &Progress<'_>,
     ) -> Result<Self, BuildError> {
         check(mesh, geometries)?;
         let scale = common_scale(geometries, options.precision);
@@ -252,6 +264,7 @@ impl Model {
                 }
             }
         }
+        progress.advance(geometries, 1)?;
         model.bounds = boxes.iter().fold(Aabb::empty(), |a, b| a.union(*b)).to_f64();
         model.extent = Extent::new(&model.bounds);
         let small = model.bounds.is_empty() || model.bounds.min.abs().max(model.bounds.max.abs()).max_element() < 4.0;
@@ -283,6 +296,7 @@ impl Model {
             }
             (Layout::Bvh2, _) => {
                 let topology = Topology::new(&near_one(&boxes, &model.bounds), options.quality);
+                progress.advance(geometries, 5)?;
                 model.numbers = topology.order.iter().map(number).collect();
                 model.tree = MeshTree::Binary {
                     tree: Bvh2::new(&topology, &boxes),
@@ -292,12 +306,14 @@ impl Model {
             }
             (Layout::Wide8, _) => {
                 let topology = Topology::single(&boxes, options.quality);
+                progress.advance(geometries, 5)?;
                 let (tree, order) = Wide8::new(&topology, &triangles, &boxes, false);
                 model.numbers = order.iter().map(number).collect();
                 model.tree = MeshTree::Wide { tree, level: Available::up_to(options.simd) };
             }
             (Layout::Compact8, _) => {
                 let topology = Topology::single(&boxes, options.quality);
+                progress.advance(geometries, 5)?;
                 let (wide, order) = Wide8::new(&topology, &triangles, &boxes, true);
                 let numbers: Vec<u32> = order.iter().map(number).collect();
                 let tree = Compact8::new(&wide, &numbers);
@@ -315,6 +331,7 @@ impl Model {
         // A shape that was loaded has no cost until it is filled.
         let before = old.map_or(0.0, |old| old.built_cost);
         model.built_cost = if was_refitted && before > 0.0 { before } else { model.sah_cost() };
+        progress.advance(geometries, if was_refitted { 7 } else { 2 })?;
         Ok(model)
     }
 

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use firsthit_geometry::distance::closest_on_triangle;
 use firsthit_geometry::overlap::Region;
-use firsthit_geometry::sweep::sphere_to_triangle;
+use firsthit_geometry::sweep::{ConvexBody, convex_to_triangle, sphere_to_triangle};
 use firsthit_geometry::triangle_pair::{meet, meet_otherwise};
 use firsthit_geometry::{
     Primitive, Ray,
@@ -19,7 +19,7 @@ use glam::DVec3;
 
 use crate::model::Surface;
 use crate::region::{meets, separation};
-use crate::{ClosestPoint, Crossings, Hit, HitId, Part, Scene, Separation, SphereHit, VisitedTriangle};
+use crate::{BodyHit, ClosestPoint, Crossings, Hit, HitId, Part, Scene, Separation, SphereHit, VisitedTriangle};
 
 /// All hits in the ray's closed interval, by `t`, then by id, those of the closed triangles
 /// ([`Crossings::Triangles`]). Of a shape that a ray meets more than once, all.
@@ -42,12 +42,12 @@ pub fn crossings(scene: &Scene, ray: &Ray<f64>, what: Crossings) -> Vec<Hit> {
     if !ray.is_valid() {
         return hits;
     }
-    for (i, instance) in scene.instances().iter().enumerate() {
+    for (i, instance) in scene.shown() {
         let Some(model) = scene.models().get(instance.model as usize) else { continue };
         let transform = &instance.transform;
         let local = transform.ray_to_object(ray);
         for (id, surface) in model.surfaces() {
-            let id = HitId { instance: i as u32, geometry: id.geometry, primitive: id.primitive };
+            let id = HitId { instance: i, geometry: id.geometry, primitive: id.primitive };
             match surface {
                 Surface::Triangle(v) => {
                     let crossed = what == Crossings::Triangles
@@ -81,14 +81,14 @@ pub fn crossings(scene: &Scene, ray: &Ray<f64>, what: Crossings) -> Vec<Hit> {
 #[must_use]
 pub fn exact_crossings(scene: &Scene, ray: &Ray<f64>, what: Crossings) -> Vec<Hit> {
     let mut hits = Vec::new();
-    for (i, instance) in scene.instances().iter().enumerate() {
+    for (i, instance) in scene.shown() {
         let Some(model) = scene.models().get(instance.model as usize) else { continue };
         let transform = &instance.transform;
         let local = transform.ray_to_object(ray);
         let Some(exact) = ExactRay::new(local) else { continue };
         let counts = |crosses: bool| crosses || what == Crossings::Triangles;
         for (id, surface) in model.surfaces() {
-            let id = HitId { instance: i as u32, geometry: id.geometry, primitive: id.primitive };
+            let id = HitId { instance: i, geometry: id.geometry, primitive: id.primitive };
             match surface {
                 Surface::Triangle(v) => {
                     if let Some(h) = exact.hit(v).filter(|h| counts(h.crosses)) {
@@ -116,7 +116,7 @@ pub fn exact_crossings(scene: &Scene, ray: &Ray<f64>, what: Crossings) -> Vec<Hi
                 }
             }
         }
-        let of_instance = |(_, hit): &(_, Hit)| hit.id.instance == i as u32;
+        let of_instance = |(_, hit): &(_, Hit)| hit.id.instance == i;
         let start = hits.partition_point(|h| !of_instance(h));
         hits[start..].sort_by(|(x, a), (y, b)| a.t.total_cmp(&b.t).then_with(|| x.cmp(y)).then(a.id.cmp(&b.id)));
     }
@@ -205,6 +205,16 @@ pub fn cast_sphere(scene: &Scene, ray: &Ray<f64>, radius: f64) -> Option<SphereH
     touches.min_by(|a, b| a.t.total_cmp(&b.t).then(a.id.cmp(&b.id)))
 }
 
+/// Where a moving convex body first touches a triangle, each tried.
+#[must_use]
+pub fn cast_convex(scene: &Scene, ray: &Ray<f64>, body: &ConvexBody) -> Option<BodyHit> {
+    let touches = triangles(scene).filter_map(|(id, corners)| {
+        let (touch, normal) = convex_to_triangle(ray, body, corners)?;
+        Some(BodyHit { id, t: touch.t, point: touch.point, normal })
+    });
+    touches.min_by(|a, b| a.t.total_cmp(&b.t).then(a.id.cmp(&b.id)))
+}
+
 /// All pairs of triangles that meet, by id: each pair tried.
 #[must_use]
 pub fn intersecting_pairs(scene: &Scene, other: &Scene) -> Vec<[HitId; 2]> {
@@ -246,7 +256,7 @@ pub fn winding_number(scene: &Scene, point: DVec3) -> f64 {
 
 /// All triangles in the world, as seen from a point.
 fn placed(scene: &Scene, point: DVec3) -> impl Iterator<Item = (HitId, [DVec3; 3])> {
-    scene.instances().iter().zip(0..).flat_map(move |(instance, i)| {
+    scene.shown().flat_map(move |(i, instance)| {
         let (linear, offset) = (instance.transform.linear(), instance.transform.translation() - point);
         scene.models()[instance.model as usize].surfaces().filter_map(move |(id, surface)| {
             let Surface::Triangle(corners) = surface else { return None };
@@ -258,7 +268,7 @@ fn placed(scene: &Scene, point: DVec3) -> impl Iterator<Item = (HitId, [DVec3; 3
 
 /// All triangles in the world.
 fn triangles(scene: &Scene) -> impl Iterator<Item = (HitId, [DVec3; 3])> {
-    scene.instances().iter().zip(0..).flat_map(move |(instance, i)| {
+    scene.shown().flat_map(move |(i, instance)| {
         scene.models()[instance.model as usize].surfaces().filter_map(move |(id, surface)| {
             let Surface::Triangle(corners) = surface else { return None };
             let id = HitId { instance: i, geometry: id.geometry, primitive: id.primitive };

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use glam::DAffine3;
 
+use crate::instance::Placed;
 use crate::{BuildError, Geometry, Scene};
 
 impl Scene {
@@ -45,7 +46,7 @@ impl Scene {
         let count = models.len();
         let model = models.get_mut(mesh).ok_or(BuildError::UnknownMesh { mesh, count })?;
         *model = Arc::new(model.refit(mesh, geometries, self.options())?);
-        Self::place(self.options(), models, self.placed().to_vec())
+        Self::place(self.options(), models, self.placed().to_vec(), self.mask(), Arc::clone(self.groups()))
     }
 
     /// This scene with other transforms, one for each instance. The new scene shares all meshes with this one; only the
@@ -58,8 +59,8 @@ impl Scene {
         if instances != transforms.len() {
             return Err(BuildError::TransformsChanged { instances, transforms: transforms.len() });
         }
-        let placed = self.placed().iter().zip(transforms).map(|((mesh, _), m)| (*mesh, *m)).collect();
-        Self::place(self.options(), self.models().to_vec(), placed)
+        let placed = self.placed().iter().zip(transforms).map(|(p, m)| Placed { transform: *m, ..*p }).collect();
+        Self::place(self.options(), self.models().to_vec(), placed, self.mask(), Arc::clone(self.groups()))
     }
 }
 

@@ -4,14 +4,16 @@ use core::ops::ControlFlow;
 use std::sync::Arc;
 
 use firsthit_geometry::{Aabb, Ray, Real};
-use glam::{DAffine3, DVec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::above::{Above, Asked};
-use crate::instance::{Instance, tight_boxes};
+use crate::groups::Groups;
+use crate::instance::{Instance, Placed, tight_boxes};
 use crate::kernel::Kernel;
 use crate::local::LocalRay;
 use crate::model::{Model, PrimitiveId, Surface, limit};
+use crate::progress::{Progress, Watch as WatchBuild};
 use crate::query::{Any, Closest, Collect, Collector, Dyn, ForKernel};
 use crate::stats::{Off, Probe, Watch};
 use crate::{BuildError, BuildOptions, Crossings, Geometry, Hit, HitId, TraversalCounts};
@@ -46,8 +48,12 @@ pub(crate) struct Inner {
     pub(crate) options: BuildOptions,
     /// Shared with the scenes that are made of this one by moving something else.
     pub(crate) models: Vec<Arc<Model>>,
-    /// The mesh and transform of each instance, as given.
-    placed: Vec<(usize, DAffine3)>,
+    /// Each instance, as given.
+    placed: Vec<Placed>,
+    /// Instances with none of these groups are not met.
+    mask: u32,
+    /// Which instances came in groups.
+    groups: Arc<Groups>,
     pub(crate) instances: Vec<Instance>,
     /// Over the instances with something bounded in them.
     above: Above,
@@ -65,31 +71,83 @@ impl Scene {
     pub(crate) fn new(
         options: BuildOptions,
         meshes: &[Vec<Geometry>],
-        placed: Vec<(usize, DAffine3)>,
+        placed: Vec<Placed>,
+        groups: Arc<Groups>,
+        watch: WatchBuild<'_>,
     ) -> Result<Self, BuildError> {
         limit("meshes", meshes.len() as u64)?;
         limit("instances", placed.len() as u64)?;
-        let build = |(i, mesh): (usize, &Vec<Geometry>)| Model::new(i, mesh, options).map(Arc::new);
+        let progress = Progress::of(meshes, watch);
+        let build = |(i, mesh): (usize, &Vec<Geometry>)| Model::watched(i, mesh, options, &progress).map(Arc::new);
         let models = meshes.par_iter().enumerate().map(build).collect::<Result<_, _>>()?;
-        Self::place(options, models, placed)
+        Self::place(options, models, placed, u32::MAX, groups)
     }
 
     /// A scene of models that are built.
     pub(crate) fn place(
         options: BuildOptions,
         models: Vec<Arc<Model>>,
-        placed: Vec<(usize, DAffine3)>,
+        placed: Vec<Placed>,
+        mask: u32,
+        groups: Arc<Groups>,
     ) -> Result<Self, BuildError> {
         let instances: Vec<Instance> = placed
             .iter()
             .enumerate()
-            .map(|(i, &(mesh, transform))| {
-                let model =
-                    models.get(mesh).ok_or(BuildError::NoSuchMesh { instance: i, mesh, count: models.len() })?;
-                Instance::new(i, mesh, model.scale(), transform)
+            .map(|(i, placed)| {
+                let (mesh, count) = (placed.mesh, models.len());
+                let model = models.get(mesh).ok_or(BuildError::NoSuchMesh { instance: i, mesh, count })?;
+                Instance::new(i, placed, model.scale(), mask)
             })
             .collect::<Result<_, _>>()?;
+        Ok(Self::arrange(options, models, placed, instances, mask, groups))
+    }
 
+    /// This scene for queries that ask about some groups of instances only: those instances that have one of these bits in
+    /// their mask (see [`SceneBuilder::set_mask`](crate::SceneBuilder::set_mask)). To all queries the others are not there.
+    /// Instances keep their indices.
+    ///
+    /// It shares all meshes with this scene, and may ask about what this one leaves out: only a tree over the instances is
+    /// built. Its queries take no longer than those of a scene that never had the others; where each ray has a mask of its own,
+    /// [`Scene::closest_hit_filtered`] can look at the instance.
+    ///
+    /// ```
+    /// use firsthit_accel::{Geometry, SceneBuilder};
+    /// use firsthit_geometry::{Ray, shapes::Sphere};
+    /// use glam::{DAffine3, DVec3};
+    ///
+    /// const OPAQUE: u32 = 1;
+    /// const GLASS: u32 = 2;
+    /// let mut builder = SceneBuilder::default();
+    /// let ball = builder.add_mesh(vec![Geometry::Shape(Sphere::new(DVec3::ZERO, 1.0)?.into())]);
+    /// for (z, mask) in [(0.0, OPAQUE), (5.0, GLASS)] {
+    ///     let instance = builder.add_instance(ball, DAffine3::from_translation(DVec3::Z * z));
+    ///     builder.set_mask(instance, mask);
+    /// }
+    /// let scene = builder.build()?;
+    /// let ray = Ray::new(DVec3::Z * 9.0, DVec3::NEG_Z);
+    /// assert_eq!(scene.closest_hit(&ray).unwrap().t, 3.0);
+    /// let hit = scene.seen_by(OPAQUE).closest_hit(&ray).unwrap();
+    /// assert_eq!((hit.id.instance, hit.t), (0, 8.0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn seen_by(&self, mask: u32) -> Self {
+        let Inner { options, models, placed, instances, groups, .. } = &*self.inner;
+        let shown = |(i, p): (&Instance, &Placed)| Instance { shown: p.mask & mask != 0, ..i.clone() };
+        let instances = instances.iter().zip(placed).map(shown).collect();
+        Self::arrange(*options, models.clone(), placed.clone(), instances, mask, groups.clone())
+    }
+
+    /// A scene of instances that are where they are to be.
+    fn arrange(
+        options: BuildOptions,
+        models: Vec<Arc<Model>>,
+        placed: Vec<Placed>,
+        instances: Vec<Instance>,
+        mask: u32,
+        groups: Arc<Groups>,
+    ) -> Self {
         let tight = tight_boxes(&instances, &models);
         let bounds = tight.iter().fold(Aabb::empty(), |a, b| a.union(*b));
         let bounded: Vec<u32> = (0..instances.len() as u32).filter(|&i| !tight[i as usize].is_empty()).collect();
@@ -102,14 +160,26 @@ impl Scene {
             .collect();
         let above = Above::new(&boxes, options);
         let unbounded = (0..instances.len() as u32)
-            .filter(|&i| models[instances[i as usize].model as usize].has_unbounded())
+            .filter(|&i| instances[i as usize].shown && models[instances[i as usize].model as usize].has_unbounded())
             .collect();
         let round_trip = instances.iter().fold(0.0, |most: f64, i| most.max(i.transform.round_trip()));
         let stats = SceneStats::default();
-        let mut inner =
-            Inner { options, models, placed, instances, above, bounded, unbounded, bounds, round_trip, stats };
+        let mut inner = Inner {
+            options,
+            models,
+            placed,
+            mask,
+            groups,
+            instances,
+            above,
+            bounded,
+            unbounded,
+            bounds,
+            round_trip,
+            stats,
+        };
         inner.stats = inner.stats();
-        Ok(Self { inner: Arc::new(inner) })
+        Self { inner: Arc::new(inner) }
     }
 
     /// The nearest hit that `accept` accepts, other than on the flat primitive `source` that the ray starts from.
@@ -175,8 +245,21 @@ impl Scene {
         &self.inner.models
     }
 
-    pub(crate) fn placed(&self) -> &[(usize, DAffine3)] {
+    pub(crate) fn placed(&self) -> &[Placed] {
         &self.inner.placed
+    }
+
+    pub(crate) fn groups(&self) -> &Arc<Groups> {
+        &self.inner.groups
+    }
+
+    pub(crate) fn mask(&self) -> u32 {
+        self.inner.mask
+    }
+
+    /// The instances that queries meet, with their indices.
+    pub(crate) fn shown(&self) -> impl Iterator<Item = (u32, &Instance)> {
+        (0..).zip(&self.inner.instances).filter(|(_, instance)| instance.shown)
     }
 
     pub(crate) fn instances(&self) -> &[Instance] {
@@ -322,7 +405,12 @@ impl Inner {
         let models: usize = self.models.iter().map(|m| m.bytes()).sum();
         SceneStats {
             stored_triangles: weight,
-            instanced_triangles: self.instances.iter().map(|i| stored(&self.models[i.model as usize])).sum(),
+            instanced_triangles: self
+                .instances
+                .iter()
+                .filter(|i| i.shown)
+                .map(|i| stored(&self.models[i.model as usize]))
+                .sum(),
             instances: self.instances.len() as u64,
             sah_cost: if weight > 0 { cost / weight as f64 } else { 0.0 },
             depth: self.above.depth() + self.models.iter().map(|m| m.depth()).max().unwrap_or(0),

@@ -17,6 +17,7 @@ mod single;
 mod solid;
 mod spawn;
 mod twins;
+mod update;
 
 use firsthit_accel::{BuildOptions, Geometry, Hit, HitId, Scene, SceneBuilder};
 use firsthit_geometry::Precision;

@@ -8,6 +8,7 @@ use firsthit_accel::{
 use firsthit_geometry::clip::HalfSpace;
 use firsthit_geometry::frustum::{Containment, Frustum};
 use firsthit_geometry::overlap::{Capsule, Convex, OrientedBox, Region, Sphere};
+use firsthit_geometry::sweep::ConvexBody;
 use firsthit_geometry::{Aabb, Precision, Ray, shapes};
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 use proptest::prelude::*;
@@ -122,7 +123,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(100))]
 
     #[test]
-    fn a_moving_sphere_touches_what_the_slow_twin_finds(
+    fn moving_bodies_touch_what_the_slow_twin_finds(
         mesh in mesh(), places in prop::collection::vec(place(), 1..12), throws in prop::collection::vec(throw(), 6),
     ) {
         let mut rays = Vec::new();
@@ -145,6 +146,10 @@ proptest! {
         for scene in scenes(&mesh, &places) {
             for (ray, radius) in &rays {
                 prop_assert_eq!(scene.cast_sphere(ray, *radius), reference::cast_sphere(&scene, ray, *radius));
+                // A tetrahedron in the sphere's place.
+                let corners = [DVec3::ZERO, DVec3::X, DVec3::new(0.2, 1.0, 0.1), DVec3::new(-0.3, 0.1, 1.0)].map(|p| p * *radius);
+                let Ok(body) = ConvexBody::new(&corners) else { continue };
+                prop_assert_eq!(scene.cast_convex(ray, &body), reference::cast_convex(&scene, ray, &body));
             }
         }
     }

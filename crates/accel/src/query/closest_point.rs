@@ -29,6 +29,13 @@ pub struct ClosestPoint {
 }
 
 impl ClosestPoint {
+    /// Weights of the triangle's three vertices; they add up to 1. See [`Hit::interpolate`](crate::Hit::interpolate).
+    #[inline]
+    #[must_use]
+    pub fn weights(&self) -> [f32; 3] {
+        [1.0 - self.u - self.v, self.u, self.v]
+    }
+
     /// Unit geometric normal of the triangle in the world, by its winding.
     #[inline]
     #[must_use]

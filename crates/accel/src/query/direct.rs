@@ -505,6 +505,9 @@ impl Inner {
     #[inline(always)]
     fn only(&self) -> Option<(Available, Only<'_, Wide8>)> {
         let [instance] = &self.instances[..] else { return None };
+        if !instance.shown {
+            return None;
+        }
         let model = &self.models[instance.model as usize];
         let (tree, level) = model.wide()?;
         Some((level, Only { model, tree, transform: &instance.transform }))
@@ -526,6 +529,9 @@ impl Inner {
     #[inline(always)]
     fn only_compact(&self) -> Option<(Available, Only<'_, Compact8>)> {
         let [instance] = &self.instances[..] else { return None };
+        if !instance.shown {
+            return None;
+        }
         let model = &self.models[instance.model as usize];
         let (tree, level) = model.compact()?;
         Some((level, Only { model, tree, transform: &instance.transform }))

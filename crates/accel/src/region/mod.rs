@@ -19,7 +19,7 @@ use crate::scene::Inner;
 use crate::{HitId, Scene};
 use cursor::Cursor;
 
-pub use cast::SphereHit;
+pub use cast::{BodyHit, SphereHit};
 pub(crate) use overlap::meets;
 pub(crate) use pairs::separation;
 pub use pairs::{CurveSegment, Separation};

@@ -124,7 +124,7 @@ impl Scene {
 
     /// Shapes whose boxes meet a region, and those that have none.
     pub(crate) fn shapes_near(&self, region: &impl Region) -> impl Iterator<Item = Part> {
-        self.instances().iter().zip(0..).flat_map(move |(instance, i)| {
+        self.shown().flat_map(move |(i, instance)| {
             let shapes = self.models()[instance.model as usize].shape_boxes();
             shapes.filter_map(move |(geometry, bounds)| {
                 let bounds = instance.transform.aabb(&bounds);

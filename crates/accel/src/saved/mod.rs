@@ -10,6 +10,7 @@ mod write;
 
 use std::sync::Arc;
 
+use crate::builder::Parts;
 use crate::model::Model;
 use crate::{BuildError, Scene, SceneBuilder};
 
@@ -77,7 +78,7 @@ impl SceneBuilder {
     /// when the scene cannot be built.
     pub fn build_with_trees(self, saved: &[u8]) -> Result<Scene, SavedTreesError> {
         let trees = read::trees(saved)?;
-        let (options, meshes, instances) = self.into_parts();
+        let Parts { options, meshes, instances, groups } = self.into_parts()?;
         if trees.len() != meshes.len() {
             return Err(SavedTreesError::Other("not as many meshes"));
         }
@@ -94,7 +95,7 @@ impl SceneBuilder {
             }
             models.push(Arc::new(model));
         }
-        Ok(Scene::place(options, models, instances)?)
+        Ok(Scene::place(options, models, instances, u32::MAX, groups)?)
     }
 }
 

@@ -16,6 +16,13 @@ pub(super) struct Boundary {
     pub(super) edges: Vec<([Vec3; 2], u32)>,
 }
 
+/// Of nothing.
+impl Default for Boundary {
+    fn default() -> Self {
+        Self { closed: true, edges: Vec::new() }
+    }
+}
+
 impl Boundary {
     /// Vertices are one where their positions are.
     pub(super) fn new(model: &Model) -> Self {
@@ -33,7 +40,7 @@ impl Boundary {
             edges.extend([(a, b), (b, c), (c, a)].map(|(u, v)| ([u.min(v), u.max(v)], u < v)));
         });
         edges.sort_unstable();
-        let mut boundary = Self { closed: true, edges: Vec::new() };
+        let mut boundary = Self::default();
         for same in edges.chunk_by(|x, y| x.0 == y.0) {
             let ([low, high], _) = same[0];
             let upward = same.iter().filter(|(_, up)| *up).count();

@@ -13,7 +13,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::kernel::{Exact, Robust};
-use crate::model::Surface;
+use crate::model::{Model, Surface};
 use crate::query::{Collect, Dyn, Take};
 use crate::scene::Inner;
 use crate::stats::Off;
@@ -102,7 +102,7 @@ impl Solid {
     pub fn new(scene: &Scene) -> Self {
         let boundaries = boundaries(scene);
         let all = |f: fn(&Boundary) -> bool| boundaries.iter().all(|b| f(b));
-        let edges: usize = scene.instances().iter().map(|i| boundaries[i.model as usize].edges.len()).sum();
+        let edges: usize = scene.shown().map(|(_, i)| boundaries[i.model as usize].edges.len()).sum();
         let method = if all(|b| b.edges.is_empty()) {
             SignMethod::Winding
         } else if all(|b| b.closed) {
@@ -250,7 +250,7 @@ impl Solid {
 
     /// Each instance with what belongs to its model.
     fn of_instances<'a, T>(&'a self, of: &'a [T]) -> impl Iterator<Item = (&'a crate::instance::Instance, &'a T)> {
-        self.scene.instances().iter().filter_map(|i| Some((i, of.get(i.model as usize)?)))
+        self.scene.shown().filter_map(|(_, i)| Some((i, of.get(i.model as usize)?)))
     }
 
     /// From a point to where the scene ends soonest, and not along anything that people align with axes.
@@ -301,7 +301,11 @@ const CHUNK: usize = 1024;
 
 fn boundaries(scene: &Scene) -> Vec<Arc<Boundary>> {
     let inner: &Inner = scene.inner();
-    inner.models.par_iter().map(|model| Arc::new(Boundary::new(model))).collect()
+    let mut shown = vec![false; inner.models.len()];
+    scene.shown().for_each(|(_, i)| shown[i.model as usize] = true);
+    // What no query meets has no holes.
+    let of = |(model, shown): (&Arc<Model>, &bool)| if *shown { Boundary::new(model) } else { Boundary::default() };
+    inner.models.par_iter().zip(&shown).map(|of_model| Arc::new(of(of_model))).collect()
 }
 
 /// Counts crossings of triangles.

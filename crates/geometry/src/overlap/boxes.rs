@@ -43,7 +43,8 @@ impl Region for Aabb<f64> {
 }
 
 impl OrientedBox {
-    fn corners(&self) -> impl Iterator<Item = DVec3> {
+    /// Its eight corners.
+    pub fn corners(&self) -> impl Iterator<Item = DVec3> {
         let to_world = move |p| self.center + self.axes * p;
         Aabb::<f64>::new(-self.half, self.half).corners().into_iter().map(to_world)
     }

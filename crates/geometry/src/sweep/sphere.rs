@@ -1,18 +1,10 @@
-//! Bodies that move along a ray: when they first touch.
+//! A sphere.
 
 use glam::DVec3;
 
+use super::Touch;
 use crate::Ray;
 use crate::distance::closest_on_triangle;
-
-/// Where a moving sphere first touches.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Touch {
-    /// The parameter of the ray when it does.
-    pub t: f64,
-    /// The point of the triangle that is touched.
-    pub point: DVec3,
-}
 
 /// When a sphere whose center moves along a ray first has a point in common with a triangle: at the start of the interval,
 /// if it has one there.
