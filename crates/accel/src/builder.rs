@@ -8,7 +8,7 @@ use glam::{DAffine3, Vec3};
 
 use crate::groups::Groups;
 use crate::instance::Placed;
-use crate::{BuildError, BuildOptions, Scene};
+use crate::{BuildError, BuildOptions, Scene, UserPrimitives};
 
 /// A part of a mesh.
 #[allow(clippy::large_enum_variant, reason = "one for each shape of a scene, not for each primitive")]
@@ -23,6 +23,8 @@ pub enum Geometry {
     },
     /// An analytic shape.
     Shape(Shape<f64>),
+    /// Primitives of the user's own.
+    User(Arc<dyn UserPrimitives>),
 }
 
 /// Gathers meshes and instances, then builds.

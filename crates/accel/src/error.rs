@@ -44,6 +44,18 @@ pub enum BuildError {
         /// Index of the instance.
         instance: usize,
     },
+    /// The box of a primitive of the user's own is empty or no box.
+    #[error(
+        "mesh {mesh}, geometry {geometry}: the box of primitive {primitive} is empty or has coordinates that are no numbers"
+    )]
+    UnusableBounds {
+        /// Index of the mesh.
+        mesh: usize,
+        /// Index of the geometry.
+        geometry: usize,
+        /// Index of the primitive.
+        primitive: u32,
+    },
     /// A mask or an update names an instance that is not there.
     #[error("instance {instance} does not exist (there are {count})")]
     NoSuchInstance {
@@ -92,7 +104,7 @@ pub enum BuildError {
         now: usize,
     },
     /// A refit keeps the number of a geometry's triangles.
-    #[error("mesh {mesh}, geometry {geometry} was built of {before} triangles, and now has {now}")]
+    #[error("mesh {mesh}, geometry {geometry} was built of {before} primitives, and now has {now}")]
     TrianglesChanged {
         /// Index of the mesh.
         mesh: usize,

@@ -11,7 +11,7 @@ pub struct HitId {
     pub instance: u32,
     /// Index of the geometry in its mesh.
     pub geometry: u32,
-    /// Index of the triangle in its geometry; 0 for a shape.
+    /// Index of the triangle, or of the user's primitive, in its geometry; 0 for a shape.
     pub primitive: u32,
 }
 

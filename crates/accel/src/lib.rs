@@ -63,6 +63,7 @@ mod stats;
 mod surface_point;
 mod traverse;
 mod update;
+mod user;
 mod visit_order;
 mod wide;
 
@@ -80,5 +81,6 @@ pub use scene::{Scene, SceneStats};
 pub use simd::Level;
 pub use solid::{SignMethod, Solid};
 pub use update::SceneUpdate;
+pub use user::UserPrimitives;
 #[doc(hidden)]
 pub use visit_order::VisitOrder;

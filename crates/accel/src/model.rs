@@ -3,9 +3,10 @@
 use core::marker::PhantomData;
 use core::ops::{ControlFlow, Range};
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use firsthit_geometry::{
-    Aabb, Precision, Primitive, Ray, Real, Shape, SurfaceHit, exact::Root, transform::Transform, triangle,
+    Aabb, Precision, Primitive, Ray, Real, SurfaceHit, exact::Root, transform::Transform, triangle,
 };
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -25,6 +26,7 @@ use crate::saved::TreeShape;
 use crate::simd::{self, Available, Lanes, Work};
 use crate::stats::{DynProbe, Off, Probe};
 use crate::traverse::traverse;
+use crate::user::OtherSurface;
 use crate::wide::{self, Boxes, WideTree};
 use crate::{BuildError, BuildOptions, Geometry, Guards, Hit, HitId, Layout};
 
@@ -85,15 +87,17 @@ pub(crate) struct PrimitiveId {
 enum Places {
     /// Position in the leaves' order of each triangle; none (`u32::MAX`) for those without area.
     Triangles(Vec<u32>),
-    /// Index into the shapes.
-    Shape(u32),
+    /// Index into the shapes of the first, and how many there are.
+    Shapes(u32, u32),
 }
 
 /// A shape in a mesh.
 #[derive(Clone, Debug)]
 pub(crate) struct ModelShape {
     pub(crate) geometry: u32,
-    pub(crate) shape: Shape<f64>,
+    /// Among those of its geometry.
+    pub(crate) primitive: u32,
+    pub(crate) shape: OtherSurface,
     /// Its box, normalised.
     bounds: Aabb<f64>,
     /// Size of the normalised space's unit, a power of two.
@@ -247,20 +251,27 @@ impl Model {
                     boxes.par_extend(triangles[before..].par_iter().map(|t| Aabb::from_points(*t)));
                     first += indices.len() as u32;
                 }
-                Geometry::Shape(shape) => {
-                    let index = model.shapes.len() as u32;
-                    model.places.push(Places::Shape(index));
-                    let b = shape.bounds();
-                    let bounds = Aabb::new(b.min / scale, b.max / scale);
-                    if bounds.is_finite() {
-                        triangles.push([Vec3::ZERO; 3]);
-                        boxes.push(bounds.to_f32_outward());
-                        numbers.push(first);
-                    } else {
-                        model.unbounded.push(index);
+                Geometry::Shape(_) | Geometry::User(_) => {
+                    let count = count(geometry);
+                    model.places.push(Places::Shapes(model.shapes.len() as u32, count));
+                    for primitive in 0..count {
+                        let shape = match geometry {
+                            Geometry::Shape(shape) => OtherSurface::Shape(shape.clone()),
+                            Geometry::User(user) => OtherSurface::User(Arc::clone(user), primitive),
+                            Geometry::Triangles { .. } => continue,
+                        };
+                        let b = shape.bounds();
+                        let bounds = Aabb::new(b.min / scale, b.max / scale);
+                        if bounds.is_finite() {
+                            triangles.push([Vec3::ZERO; 3]);
+                            boxes.push(bounds.to_f32_outward());
+                            numbers.push(first + primitive);
+                        } else {
+                            model.unbounded.push(model.shapes.len() as u32);
+                        }
+                        model.shapes.push(ModelShape { geometry: g, primitive, shape, bounds, scale });
                     }
-                    model.shapes.push(ModelShape { geometry: g, shape: shape.clone(), bounds, scale });
-                    first += 1;
+                    first += count;
                 }
             }
         }
@@ -356,7 +367,14 @@ impl Model {
                     let (before, now) = (old.len(), triangles.len());
                     return Err(BuildError::TrianglesChanged { mesh, geometry, before, now });
                 }
-                (Places::Triangles(_), Geometry::Triangles { .. }) | (Places::Shape(_), Geometry::Shape(_)) => {}
+                (Places::Triangles(_), Geometry::Triangles { .. }) => {}
+                (Places::Shapes(_, 1), Geometry::Shape(_)) => {}
+                (Places::Shapes(_, before), Geometry::User(user)) => {
+                    let (before, now) = (*before as usize, user.count() as usize);
+                    if before != now {
+                        return Err(BuildError::TrianglesChanged { mesh, geometry, before, now });
+                    }
+                }
                 _ => return Err(BuildError::KindChanged { mesh, geometry }),
             }
         }
@@ -448,7 +466,10 @@ impl Model {
     /// All primitives in the caller's order.
     pub(crate) fn surfaces(&self) -> impl Iterator<Item = (PrimitiveId, Surface<'_>)> + '_ {
         self.places.iter().enumerate().flat_map(move |(g, places)| {
-            let count = if let Places::Triangles(t) = places { t.len() } else { 1 };
+            let count = match places {
+                Places::Triangles(t) => t.len(),
+                Places::Shapes(_, count) => *count as usize,
+            };
             (0..count).filter_map(move |k| {
                 let id = PrimitiveId { geometry: g as u32, primitive: k as u32 };
                 Some((id, self.surface(id)?))
@@ -490,7 +511,10 @@ impl Model {
                 let place = *places.get(id.primitive as usize)?;
                 Some(Surface::Triangle(double(&self.triangle(place as usize)?)))
             }
-            Places::Shape(index) => self.shapes.get(*index as usize).map(Surface::Shape),
+            Places::Shapes(first, count) if id.primitive < *count => {
+                self.shapes.get((first + id.primitive) as usize).map(Surface::Shape)
+            }
+            Places::Shapes(..) => None,
         }
     }
 
@@ -504,7 +528,16 @@ impl Model {
     pub(crate) fn place(&self, id: PrimitiveId) -> Option<usize> {
         match self.places.get(id.geometry as usize)? {
             Places::Triangles(places) => places.get(id.primitive as usize).map(|place| *place as usize),
-            Places::Shape(_) => None,
+            Places::Shapes(..) => None,
+        }
+    }
+
+    /// The shape at a place of the leaves; `None` if that is a triangle.
+    fn shape_at(&self, place: usize) -> Option<u32> {
+        let id = self.id(place)?;
+        match self.places.get(id.geometry as usize)? {
+            Places::Shapes(first, _) => Some(first + id.primitive),
+            Places::Triangles(_) => None,
         }
     }
 
@@ -657,12 +690,11 @@ impl Model {
         let leaf = |range: Range<usize>, probe: &mut P| {
             for place in range {
                 probe.primitives(1);
-                let shape = || self.places.get(self.id(place)?.geometry as usize);
-                if SHAPES && let Some(Places::Shape(index)) = shape() {
+                if SHAPES && let Some(index) = self.shape_at(place) {
                     let taken = if precision == Precision::Exact {
-                        self.offer_exact_shape::<SURFACES, _, P>(*index, ray, instance, collector, probe)?
+                        self.offer_exact_shape::<SURFACES, _, P>(index, ray, instance, collector, probe)?
                     } else {
-                        self.offer_shape(*index, ray, instance, precision, K::clamped(&offer.setup), collector)?
+                        self.offer_shape(index, ray, instance, precision, K::clamped(&offer.setup), collector)?
                     };
                     if taken {
                         end = offer.shortened(collector);
@@ -718,7 +750,7 @@ impl Model {
             if SURFACES && !found.crosses {
                 return ControlFlow::Continue(());
             }
-            let id = HitId { instance, geometry: entry.geometry, primitive: 0 };
+            let id = HitId { instance, geometry: entry.geometry, primitive: entry.primitive };
             let normal = hit.normal.unwrap_or(DVec3::ZERO);
             outcome = collector.offer(Candidate::new(id, hit.t * ray.t_unscale, hit.u as f32, hit.v as f32, normal));
             // The nearest that is taken is enough.
@@ -751,12 +783,11 @@ impl Model {
             t_min: collector.t_min() * ray.t_scale,
             t_max: collector.t_max() * ray.t_scale,
         };
-        // No ray meets one of the shapes more often than this.
-        for _ in 0..16 {
+        for _ in 0..entry.shape.most_hits() {
             let Some(hit) = shape_hit(&entry.shape, &local, precision) else { break };
             let t = if clamped { ray.line().within_box(hit.t, &entry.bounds) } else { Some(hit.t) };
             if let Some(t) = t {
-                let id = HitId { instance, geometry: entry.geometry, primitive: 0 };
+                let id = HitId { instance, geometry: entry.geometry, primitive: entry.primitive };
                 let normal = hit.normal.unwrap_or(DVec3::ZERO);
                 let t = t * ray.t_unscale;
                 let taken = collector.offer(Candidate::new(id, t, hit.u as f32, hit.v as f32, normal))?;
@@ -819,7 +850,7 @@ impl<const SURFACES: bool, T: WideTree, K: Kernel, C: Collector, P: Probe> Work
 }
 
 /// Shapes are evaluated in `f64` at the tiers below `Exact`: by the shortest formulas or by the stable ones.
-fn shape_hit(shape: &Shape<f64>, ray: &Ray<f64>, precision: Precision) -> Option<SurfaceHit<f64>> {
+fn shape_hit(shape: &OtherSurface, ray: &Ray<f64>, precision: Precision) -> Option<SurfaceHit<f64>> {
     match precision {
         Precision::Fast => shape.closest_hit_fast(ray),
         Precision::Robust | Precision::Double => shape.closest_hit(ray),
@@ -856,12 +887,29 @@ fn near_one<'a>(boxes: &'a [Aabb<f32>], bounds: &Aabb<f64>) -> Cow<'a, [Aabb<f32
     boxes.iter().map(|b| Aabb::new(b.min * k, b.max * k)).collect()
 }
 
+/// How many primitives it has that are no triangles.
+fn count(geometry: &Geometry) -> u32 {
+    match geometry {
+        Geometry::Triangles { .. } => 0,
+        Geometry::Shape(_) => 1,
+        Geometry::User(user) => user.count(),
+    }
+}
+
 /// Everything finite, in range and countable.
 fn check(mesh: usize, geometries: &[Geometry]) -> Result<(), BuildError> {
     let mut primitives = 0u64;
     for (geometry, g) in geometries.iter().enumerate() {
         let Geometry::Triangles { positions, triangles } = g else {
-            primitives += 1;
+            primitives += u64::from(count(g));
+            let unusable = |i: &u32| {
+                let Geometry::User(user) = g else { return false };
+                let bounds = user.bounds(*i);
+                bounds.is_empty() || bounds.min.is_nan() || bounds.max.is_nan()
+            };
+            if let Some(primitive) = (0..count(g)).find(unusable) {
+                return Err(BuildError::UnusableBounds { mesh, geometry, primitive });
+            }
             continue;
         };
         primitives += triangles.len() as u64;

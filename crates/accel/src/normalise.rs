@@ -1,6 +1,6 @@
 //! The power of two by which a mesh's coordinates are divided.
 
-use firsthit_geometry::{Precision, Primitive, Real};
+use firsthit_geometry::{Aabb, Precision, Primitive, Real};
 use glam::Vec3;
 
 use crate::Geometry;
@@ -19,11 +19,9 @@ pub(crate) fn common_scale(geometries: &[Geometry], precision: Precision) -> f64
                 let m = positions.iter().fold(Vec3::ZERO, |m, p| m.max(p.abs()));
                 largest = largest.max(f64::from(m.max_element()));
             }
-            Geometry::Shape(shape) => {
-                let b = shape.bounds();
-                if b.is_finite() {
-                    largest = largest.max(b.min.abs().max(b.max.abs()).max_element());
-                }
+            Geometry::Shape(shape) => largest = largest.max(extreme(&shape.bounds())),
+            Geometry::User(user) => {
+                largest = (0..user.count()).map(|i| extreme(&user.bounds(i))).fold(largest, f64::max);
             }
         }
     }
@@ -39,6 +37,11 @@ pub(crate) fn common_scale(geometries: &[Geometry], precision: Precision) -> f64
         .min();
     let needed = finest.map_or(f64::INFINITY, |digit| 2f64.powi(digit - LEAST));
     scale.min(needed).max(scale * 2f64.powi(-100))
+}
+
+/// The largest coordinate of a box; of one that has no end, 0.
+fn extreme(bounds: &Aabb<f64>) -> f64 {
+    if bounds.is_finite() { bounds.min.abs().max(bounds.max.abs()).max_element() } else { 0.0 }
 }
 
 /// Exponent of the least positive `f32`.

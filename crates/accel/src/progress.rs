@@ -47,6 +47,10 @@ impl<'a> Progress<'a> {
 
 /// Of no mesh is it nothing.
 fn size(mesh: &[Geometry]) -> u64 {
-    let of = |g: &Geometry| if let Geometry::Triangles { triangles, .. } = g { triangles.len() as u64 } else { 1 };
+    let of = |g: &Geometry| match g {
+        Geometry::Triangles { triangles, .. } => triangles.len() as u64,
+        Geometry::Shape(_) => 1,
+        Geometry::User(user) => u64::from(user.count()),
+    };
     1 + mesh.iter().map(of).sum::<u64>()
 }

@@ -18,6 +18,7 @@ mod solid;
 mod spawn;
 mod twins;
 mod update;
+mod user;
 
 use firsthit_accel::{BuildOptions, Geometry, Hit, HitId, Scene, SceneBuilder};
 use firsthit_geometry::Precision;

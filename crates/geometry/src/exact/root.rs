@@ -45,6 +45,13 @@ impl Root {
     }
 }
 
+/// A finite number; of others, 0.
+impl From<f64> for Root {
+    fn from(t: f64) -> Self {
+        Self::quotient(Dyadic::new(if t.is_finite() { t } else { 0.0 }), Dyadic::new(1.0))
+    }
+}
+
 impl Ord for Root {
     fn cmp(&self, o: &Self) -> Ordering {
         let ([a, b, c], [d, e, f]) = (&self.coefficients, &o.coefficients);
