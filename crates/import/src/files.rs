@@ -113,52 +113,107 @@ impl Folder {
 /// Reads a whole file. One named `*.zst` or `*.gz` is decompressed.
 ///
 /// # Errors
+/// As for [`Input`].
+pub(crate) fn read(path: &Path, limits: &Limits) -> Result<Vec<u8>, ImportError> {
+    Input::open(path, limits)?.rest()
+}
+
+/// A file that is read piece by piece, up to a limit. One named `*.zst` or `*.gz` is decompressed.
+///
+/// # Errors
 /// [`ErrorKind::Io`] if it is no regular file or cannot be read, [`ErrorKind::Limit`] if it is too large,
 /// [`ErrorKind::Invalid`] if the compressed data are damaged.
-pub(crate) fn read(path: &Path, limits: &Limits) -> Result<Vec<u8>, ImportError> {
-    let at = |kind| ImportError::new(path, "", kind);
-    let too_large = |limit: u64, after: &str| {
-        at(ErrorKind::Limit(format!("more than {limit} bytes{after}, the most that is read")))
-    };
-    let meta = fs::metadata(path).map_err(|e| ImportError::io(path, e))?;
-    if !meta.is_file() {
-        // A folder, a device, or a pipe, which would be waited for without end.
-        let cause = if meta.is_dir() { "is a folder" } else { "is not a regular file" };
-        return Err(ImportError::io(path, io::Error::new(io::ErrorKind::InvalidInput, cause)));
-    }
-    if meta.len() > limits.file_bytes {
-        return Err(too_large(limits.file_bytes, ""));
-    }
-    let file = File::open(path).map_err(|e| ImportError::io(path, e))?;
-    let damaged = |e: io::Error| at(ErrorKind::Invalid(format!("damaged compressed data: {e}")));
-    let mut bytes = Vec::new();
-    let compression = compression(path);
-    let limit = match compression {
-        Compression::None => limits.file_bytes,
+pub(crate) struct Input<'a> {
+    path: &'a Path,
+    reader: Box<dyn Read + 'a>,
+    /// What was read ahead.
+    ahead: Vec<u8>,
+    compressed: bool,
+    /// How many bytes it has, where that is known.
+    length: u64,
+    limit: u64,
+    /// How many bytes there may still be.
+    left: u64,
+}
+
+impl<'a> Input<'a> {
+    pub(crate) fn open(path: &'a Path, limits: &Limits) -> Result<Self, ImportError> {
+        let io = |e| ImportError::io(path, e);
+        let meta = fs::metadata(path).map_err(io)?;
+        if !meta.is_file() {
+            // A folder, a device, or a pipe, which would be waited for without end.
+            let cause = if meta.is_dir() { "is a folder" } else { "is not a regular file" };
+            return Err(io(io::Error::new(io::ErrorKind::InvalidInput, cause)));
+        }
+        if meta.len() > limits.file_bytes {
+            return Err(too_large(path, limits.file_bytes, false));
+        }
+        let file = File::open(path).map_err(io)?;
         // A small file that becomes a huge one is no model.
-        Compression::Gzip | Compression::Zstandard => limits.decompressed(meta.len()),
-    };
-    // One byte more than allowed tells "all of it" from "too much".
-    let most = limit.saturating_add(1);
-    match compression {
-        Compression::None => {
-            bytes.reserve_exact(usize::try_from(meta.len()).unwrap_or(0));
-            file.take(most).read_to_end(&mut bytes).map_err(|e| ImportError::io(path, e))?;
-        }
-        Compression::Gzip => {
-            let decoder = flate2::bufread::MultiGzDecoder::new(BufReader::new(file));
-            decoder.take(most).read_to_end(&mut bytes).map_err(damaged)?;
-        }
-        Compression::Zstandard => {
-            let decoder = ruzstd::decoding::StreamingDecoder::new(BufReader::new(file))
-                .map_err(|e| damaged(io::Error::other(e)))?;
-            decoder.take(most).read_to_end(&mut bytes).map_err(damaged)?;
-        }
+        let limit = limits.decompressed(meta.len());
+        let (reader, limit, length): (Box<dyn Read>, _, _) = match compression(path) {
+            Compression::None => (Box::new(file), limits.file_bytes, meta.len()),
+            Compression::Gzip => (Box::new(flate2::bufread::MultiGzDecoder::new(BufReader::new(file))), limit, 0),
+            Compression::Zstandard => {
+                let decoder = ruzstd::decoding::StreamingDecoder::new(BufReader::new(file))
+                    .map_err(|e| damaged(path, io::Error::other(e)))?;
+                (Box::new(decoder), limit, 0)
+            }
+        };
+        let compressed = !matches!(compression(path), Compression::None);
+        Ok(Self { path, reader, ahead: Vec::new(), compressed, length, limit, left: limit })
     }
-    if bytes.len() as u64 > limit {
-        return Err(too_large(limit, " after decompression"));
+
+    /// Bytes at hand, as they are.
+    pub(crate) fn of_bytes(bytes: &'a [u8], path: &'a Path) -> Self {
+        let (reader, limit) = (Box::new(bytes), bytes.len() as u64);
+        Self { path, reader, ahead: Vec::new(), compressed: false, length: limit, limit, left: limit }
     }
-    Ok(bytes)
+
+    /// The first bytes, which are read again later: so many, or all that there are.
+    pub(crate) fn start(&mut self, count: usize) -> Result<&[u8], ImportError> {
+        let mut start = std::mem::take(&mut self.ahead);
+        while start.len() < count && self.read(count - start.len(), &mut start)? {}
+        self.ahead = start;
+        Ok(&self.ahead)
+    }
+
+    /// Appends about so many bytes; whether there may be more.
+    pub(crate) fn read(&mut self, count: usize, bytes: &mut Vec<u8>) -> Result<bool, ImportError> {
+        if !self.ahead.is_empty() {
+            bytes.append(&mut self.ahead);
+            return Ok(true);
+        }
+        // One byte more than allowed tells "all of it" from "too much".
+        let most = (count as u64).min(self.left.saturating_add(1));
+        let read = self.reader.by_ref().take(most).read_to_end(bytes).map_err(|e| match self.compressed {
+            true => damaged(self.path, e),
+            false => ImportError::io(self.path, e),
+        })?;
+        if read as u64 > self.left {
+            return Err(too_large(self.path, self.limit, self.compressed));
+        }
+        self.left -= read as u64;
+        Ok(read as u64 == most)
+    }
+
+    /// All that follows.
+    pub(crate) fn rest(mut self) -> Result<Vec<u8>, ImportError> {
+        let mut bytes = Vec::new();
+        bytes.reserve_exact(usize::try_from(self.length).unwrap_or(0));
+        while self.read(usize::MAX, &mut bytes)? {}
+        Ok(bytes)
+    }
+}
+
+fn damaged(path: &Path, error: io::Error) -> ImportError {
+    ImportError::invalid(path, "", format!("damaged compressed data: {error}"))
+}
+
+fn too_large(path: &Path, limit: u64, decompressed: bool) -> ImportError {
+    let after = if decompressed { " after decompression" } else { "" };
+    let cause = format!("more than {limit} bytes{after}, the most that is read");
+    ImportError::new(path, "", ErrorKind::Limit(cause))
 }
 
 /// The extension that tells the format, in lower case: `obj` for `A.OBJ` and for `a.obj.zst`; empty if there is none.

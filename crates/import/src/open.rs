@@ -7,6 +7,7 @@ use std::str::FromStr;
 
 use glam::{DAffine3, DMat3, DVec3};
 
+use crate::files::Input;
 use crate::scene::SurfaceDesc;
 use crate::toml::Inclusion;
 use crate::{
@@ -210,7 +211,13 @@ pub(crate) fn read_as(
     options: &Options,
     including: &Inclusion,
 ) -> Result<Imported, ImportError> {
-    let bytes = files::read(file, &options.limits)?;
+    let mut input = Input::open(file, &options.limits)?;
+    // The only format that is not held as a whole: its files are long, and read from front to end.
+    if format == Format::Obj && !ply::is_ply(input.start(4)?) {
+        check_choices(format, file, options)?;
+        return obj::read_input(input, file, options);
+    }
+    let bytes = input.rest()?;
     let is_gltf = format == Format::Gltf || (format == Format::Json && is_gltf_json(&bytes));
     if !is_gltf {
         check_choices(format, file, options)?;

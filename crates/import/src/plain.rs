@@ -6,8 +6,8 @@ use std::path::Path;
 use glam::DAffine3;
 
 use crate::files;
-use crate::obj::mesh;
-use crate::obj::{Model, neutral};
+use crate::obj::model::{Faces, Model};
+use crate::obj::{mesh, neutral};
 use crate::scene::{GeometryDesc, InstanceDesc, MeshDesc, SurfaceDesc};
 use crate::{Imported, Report, SceneDesc};
 
@@ -38,19 +38,27 @@ pub(crate) fn scene(mut model: Model, path: &Path, unit: &str, mut report: Repor
 
 /// Leaves out faces with a vertex that f32 has no finite number for.
 fn drop_infinite(model: &mut Model, path: &Path, unit: &str, report: &mut Report) {
-    let mut first = None;
-    let before = model.faces.len();
-    let (faces, corners, positions) = (&mut model.faces, &model.corners, &model.positions);
-    faces.retain(|face| {
-        let finite = |p: [f64; 3]| p.iter().all(|x| x.abs() <= f64::from(f32::MAX));
-        let keep = corners[face.range()].iter().all(|c| finite(positions[c.position as usize]));
-        if !keep {
+    let finite = |vertex: u32| {
+        let place = model.positions[model.vertices[vertex as usize].position as usize];
+        place.iter().all(|x| x.abs() <= f64::from(f32::MAX))
+    };
+    if (0..model.vertices.len() as u32).all(finite) {
+        return;
+    }
+    let (mut first, mut lost) = (None, 0);
+    let (mut faces, mut corners) = (Faces::default(), Vec::new());
+    for (f, face) in (0..model.faces.len()).map(|f| (f, model.faces.get(f))) {
+        let of_face = model.corners_of(f);
+        if of_face.iter().all(|&vertex| finite(vertex)) {
+            corners.extend_from_slice(of_face);
+            faces.push(of_face.len() as u32, face.line, face.part, face.smoothing);
+        } else {
             first.get_or_insert(face.line);
+            lost += 1;
         }
-        keep
-    });
+    }
+    (model.faces, model.corners) = (faces, corners);
     if let Some(first) = first {
-        let lost = before - faces.len();
         let message = format!("{lost} faces left out, because a vertex of theirs is infinite or not a number");
         report.warn(path, format!("{unit} {first}"), message);
     }

@@ -57,6 +57,7 @@
 
 mod material;
 pub(crate) mod mesh;
+pub(crate) mod model;
 mod mtl;
 mod normals;
 mod parse;
@@ -70,9 +71,9 @@ use std::path::Path;
 use glam::DAffine3;
 
 pub(crate) use self::material::neutral;
-pub(crate) use self::parse::{Corner, Face, Model, NONE, Part};
+use self::model::Model;
 pub(crate) use self::text::number;
-use crate::files::{self, Folder};
+use crate::files::{self, Folder, Input};
 use crate::scene::{GeometryDesc, ImageDesc, InstanceDesc, MaterialDesc, MeshDesc, SurfaceDesc};
 use crate::{ImportError, Imported, Options, Report, SceneDesc};
 
@@ -92,7 +93,7 @@ use crate::{ImportError, Imported, Options, Report, SceneDesc};
 /// [`ImportError`] with the line and what is wrong there. Libraries and images that cannot be read are only warnings.
 pub fn read(path: impl AsRef<Path>, options: &Options) -> Result<Imported, ImportError> {
     let path = path.as_ref();
-    read_bytes(files::read(path, &options.limits)?, path, options)
+    read_input(Input::open(path, &options.limits)?, path, options)
 }
 
 /// As [`read`], of bytes at hand, not compressed. The files they name are looked for beside `path`, which need not
@@ -102,11 +103,14 @@ pub fn read(path: impl AsRef<Path>, options: &Options) -> Result<Imported, Impor
 /// As for [`read`].
 pub fn read_bytes(bytes: Vec<u8>, path: impl AsRef<Path>, options: &Options) -> Result<Imported, ImportError> {
     let path = path.as_ref();
+    read_input(Input::of_bytes(&bytes, path), path, options)
+}
+
+/// As [`read`], of a file that is open.
+pub(crate) fn read_input(input: Input<'_>, path: &Path, options: &Options) -> Result<Imported, ImportError> {
     let mut report = Report::default();
     report.reads(path);
-    let text = text::to_utf8(bytes);
-    let mut model = parse::parse(&text, path, &options.limits, &mut report)?;
-    drop(text);
+    let mut model = parse::parse(input, path, &options.limits, &mut report)?;
     let meshes = mesh::build(&mut model, path, "line", &mut report);
     let materials = Materials::load(&model, path, options, &mut report);
     let name = files::stem(path);

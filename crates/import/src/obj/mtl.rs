@@ -192,7 +192,7 @@ const KEYWORDS: &[(&str, Value)] = &[
 /// The library's text with one well-formed statement a line; what is not well-formed is left out with a warning.
 fn clean(text: &[u8], file: &Path, report: &mut Report) -> String {
     let mut out = String::new();
-    let mut lines = Lines::new(text);
+    let mut lines = Lines::new(text, 1);
     let mut unknown = HashSet::new();
     while let Some((line, statement)) = lines.next() {
         let (keyword, rest) = split_keyword(statement);

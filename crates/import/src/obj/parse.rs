@@ -3,73 +3,10 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use super::text::{Lines, name, number, split_keyword, words};
+use super::model::{Corner, Model, NONE, Part, VertexIndex};
+use super::text::{Blocks, Lines, name, number, plain_number, split_keyword, words};
+use crate::files::Input;
 use crate::{ErrorKind, ImportError, Limits, Report};
-
-/// No index.
-pub(crate) const NONE: u32 = u32::MAX;
-
-/// What an OBJ file says, with absolute indices from 0, all of them in range.
-#[derive(Debug, Default)]
-pub(crate) struct Model {
-    /// Vertex positions; those that a face uses are finite as f32.
-    pub(crate) positions: Vec<[f64; 3]>,
-    /// sRGB colours as written: empty, or one for each position.
-    pub(crate) colors: Vec<[f32; 3]>,
-    /// (0, 0) at the lower left.
-    pub(crate) uvs: Vec<[f32; 2]>,
-    /// Unit length.
-    pub(crate) normals: Vec<[f32; 3]>,
-    /// The corners of all faces, one face after the other.
-    pub(crate) corners: Vec<Corner>,
-    /// Polygons with at least three corners.
-    pub(crate) faces: Vec<Face>,
-    /// What the faces belong to, in the order of first use.
-    pub(crate) parts: Vec<Part>,
-    /// The arguments of `mtllib`, with their lines.
-    pub(crate) libraries: Vec<(u32, String)>,
-    /// The names that `usemtl` gives, in the order of first use, with their lines.
-    pub(crate) materials: Vec<(u32, String)>,
-    /// Whether there is any `s` statement.
-    pub(crate) says_smoothing: bool,
-}
-
-/// A corner of a face: indices, or [`NONE`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) struct Corner {
-    pub(crate) position: u32,
-    pub(crate) uv: u32,
-    pub(crate) normal: u32,
-}
-
-/// A polygon.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Face {
-    /// First of its corners.
-    pub(crate) start: u32,
-    /// How many.
-    pub(crate) len: u32,
-    pub(crate) line: u32,
-    pub(crate) part: u32,
-    /// 0: flat.
-    pub(crate) smoothing: u32,
-}
-
-impl Face {
-    pub(crate) fn range(self) -> std::ops::Range<usize> {
-        let start = self.start as usize;
-        start..start + self.len as usize
-    }
-}
-
-/// Faces of one object and group with one material.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
-pub(crate) struct Part {
-    pub(crate) object: String,
-    pub(crate) group: String,
-    /// Index into [`Model::materials`].
-    pub(crate) material: Option<u32>,
-}
 
 /// How often something came up, and where first.
 #[derive(Default)]
@@ -99,12 +36,17 @@ pub(super) fn place(line: u32) -> String {
 }
 
 /// Reads the statements of an OBJ file. `file` is for messages.
-pub(super) fn parse(text: &[u8], file: &Path, limits: &Limits, report: &mut Report) -> Result<Model, ImportError> {
+pub(super) fn parse(input: Input<'_>, file: &Path, limits: &Limits, report: &mut Report) -> Result<Model, ImportError> {
     let mut parser = Parser::new(file, limits);
-    let mut lines = Lines::new(text);
-    while let Some((number, line)) = lines.next() {
-        parser.line = number;
-        parser.statement(line)?;
+    let mut blocks = Blocks::new(input)?;
+    let mut first = 1;
+    while let Some(text) = blocks.next()? {
+        let mut lines = Lines::new(text, first);
+        while let Some((number, line)) = lines.next() {
+            parser.line = number;
+            parser.statement(line)?;
+        }
+        first = lines.number();
     }
     parser.finish(report)
 }
@@ -114,6 +56,7 @@ struct Parser<'a> {
     limits: &'a Limits,
     line: u32,
     model: Model,
+    vertices: VertexIndex,
     /// The part of the next face; its index is looked up when the face comes.
     part: Part,
     part_index: Option<u32>,
@@ -136,6 +79,7 @@ impl<'a> Parser<'a> {
             limits,
             line: 0,
             model: Model::default(),
+            vertices: VertexIndex::default(),
             part: Part::default(),
             part_index: None,
             part_indices: HashMap::new(),
@@ -202,15 +146,30 @@ impl<'a> Parser<'a> {
     }
 
     /// Up to N numbers; how many there were.
-    fn numbers<const N: usize>(&self, rest: &[u8]) -> Result<([f64; N], usize), ImportError> {
+    fn numbers<const N: usize>(&self, mut rest: &[u8]) -> Result<([f64; N], usize), ImportError> {
         let mut out = [0.0; N];
         let mut count = 0;
-        for (slot, word) in out.iter_mut().zip(words(rest)) {
-            let shown = || name(&word[..word.len().min(32)]).into_owned();
-            *slot = number(word).ok_or_else(|| self.invalid(format!("'{}' is not a number", shown())))?;
+        while count < N {
+            rest = rest.trim_ascii_start();
+            if matches!(rest, [] | [b'#', ..]) {
+                break;
+            }
+            (out[count], rest) = match plain_number(rest) {
+                Some(found) => found,
+                None => self.word_of_number(rest)?,
+            };
             count += 1;
         }
         Ok((out, count))
+    }
+
+    /// A number however it is written, and what follows it.
+    #[cold]
+    fn word_of_number<'t>(&self, text: &'t [u8]) -> Result<(f64, &'t [u8]), ImportError> {
+        let (word, rest) = split_keyword(text);
+        let shown = || name(&word[..word.len().min(32)]).into_owned();
+        let value = number(word).ok_or_else(|| self.invalid(format!("'{}' is not a number", shown())))?;
+        Ok((value, rest))
     }
 
     fn vertex(&mut self, rest: &[u8]) -> Result<(), ImportError> {
@@ -268,11 +227,24 @@ impl<'a> Parser<'a> {
         Err(ImportError::new(self.file, place(self.line), kind))
     }
 
-    fn face(&mut self, rest: &[u8]) -> Result<(), ImportError> {
+    fn face(&mut self, mut rest: &[u8]) -> Result<(), ImportError> {
         let start = self.model.corners.len();
-        for word in words(rest) {
-            let corner = self.corner(word)?;
-            self.model.corners.push(corner);
+        loop {
+            rest = rest.trim_ascii_start();
+            if matches!(rest, [] | [b'#', ..]) {
+                break;
+            }
+            let (indices, after) = match plain_corner(rest) {
+                Some(found) => found,
+                None => {
+                    let (word, after) = split_keyword(rest);
+                    (self.written_corner(word)?, after)
+                }
+            };
+            let corner = self.corner(indices)?;
+            let vertex = self.vertices.add(corner, self.model.positions.len(), &mut self.model.vertices);
+            self.model.corners.push(vertex);
+            rest = after;
         }
         let len = self.model.corners.len() - start;
         if len < 3 {
@@ -293,13 +265,12 @@ impl<'a> Parser<'a> {
                 *self.part_index.insert(i)
             }
         };
-        let (start, len) = (start as u32, len as u32);
-        self.model.faces.push(Face { start, len, line: self.line, part, smoothing: self.smoothing });
+        self.model.faces.push(len as u32, self.line, part, self.smoothing);
         Ok(())
     }
 
     /// `v`, `v/vt`, `v//vn` or `v/vt/vn`.
-    fn corner(&mut self, word: &[u8]) -> Result<Corner, ImportError> {
+    fn written_corner(&self, word: &[u8]) -> Result<Indices, ImportError> {
         let mut fields = word.split(|&b| b == b'/').map(|field| {
             let Some((&first, digits)) = field.split_first() else { return Some(None) };
             let (negative, digits) = match first {
@@ -316,17 +287,26 @@ impl<'a> Parser<'a> {
             }
             (!digits.is_empty()).then_some(Some(if negative { -value } else { value }))
         });
-        let v = fields.next().flatten().flatten();
+        let v = fields.next().flatten();
         let (uv, normal) = (fields.next().unwrap_or(Some(None)), fields.next().unwrap_or(Some(None)));
-        let (Some(v), Some(uv), Some(normal), None) = (v, uv, normal, fields.next()) else {
-            let shown = name(&word[..word.len().min(32)]).into_owned();
-            return Err(self.invalid(format!("'{shown}' is not a corner of a face (v, v/vt, v//vn or v/vt/vn)")));
-        };
+        match (v, uv, normal, fields.next()) {
+            (Some(Some(v)), Some(uv), Some(normal), None) => Ok([Some(v), uv, normal]),
+            _ => {
+                let shown = name(&word[..word.len().min(32)]).into_owned();
+                Err(self.invalid(format!("'{shown}' is not a corner of a face (v, v/vt, v//vn or v/vt/vn)")))
+            }
+        }
+    }
+
+    /// The corner of such indices.
+    #[inline]
+    fn corner(&mut self, [v, uv, normal]: Indices) -> Result<Corner, ImportError> {
         // Negative indices count back from the statement; positive ones may also point forward.
         let absolute = |i: i64, count: usize| {
             let i = if i < 0 { i.saturating_add(count as i64) } else { i - 1 };
             u32::try_from(i).ok().filter(|&i| i != NONE)
         };
+        let v = v.unwrap_or(0);
         let position = absolute(v, self.model.positions.len()).ok_or_else(|| self.no_vertex(v))?;
         let mut optional = |i: Option<i64>, count: usize| match i.map(|i| absolute(i, count)) {
             None => NONE,
@@ -369,35 +349,11 @@ impl<'a> Parser<'a> {
         if !self.model.colors.is_empty() {
             self.model.colors.resize(self.model.positions.len(), [1.0; 3]);
         }
-        let mut faces = std::mem::take(&mut self.model.faces);
         let mut not_finite = Tally::default();
-        for face in &mut faces {
-            self.line = face.line;
-            for c in face.range() {
-                let corner = self.model.corners[c];
-                let Some(p) = self.model.positions.get(corner.position as usize) else {
-                    return Err(self.no_vertex(i64::from(corner.position) + 1));
-                };
-                if !p.iter().all(|x| x.abs() <= f64::from(f32::MAX)) {
-                    not_finite.add(face.line);
-                    face.len = 0;
-                    break;
-                }
-                let corner = &mut self.model.corners[c];
-                let uv = self.model.uvs.get(corner.uv as usize);
-                if corner.uv != NONE && !uv.is_some_and(|uv| uv.iter().all(|x| x.is_finite())) {
-                    self.bad_attribute.add(face.line);
-                    corner.uv = NONE;
-                }
-                let normal = self.model.normals.get(corner.normal as usize);
-                if corner.normal != NONE && !normal.is_some_and(|n| n.iter().all(|x| x.is_finite())) {
-                    self.bad_attribute.add(face.line);
-                    corner.normal = NONE;
-                }
-            }
+        if !self.model.vertices.iter().all(|&v| self.is_good(v)) {
+            self.mend(&mut not_finite)?;
         }
-        faces.retain(|f| f.len > 0);
-        self.model.faces = faces;
+        self.vertices = VertexIndex::default();
 
         let file = self.file;
         let word = &self.unknown_word;
@@ -413,4 +369,104 @@ impl<'a> Parser<'a> {
         });
         Ok(self.model)
     }
+
+    fn has_finite_position(&self, corner: Corner) -> Option<bool> {
+        let place = self.model.positions.get(corner.position as usize)?;
+        Some(place.iter().all(|x| x.abs() <= f64::from(f32::MAX)))
+    }
+
+    fn has_good_uv(&self, corner: Corner) -> bool {
+        let uv = self.model.uvs.get(corner.uv as usize);
+        corner.uv == NONE || uv.is_some_and(|uv| uv.iter().all(|x| x.is_finite()))
+    }
+
+    fn has_good_normal(&self, corner: Corner) -> bool {
+        let normal = self.model.normals.get(corner.normal as usize);
+        corner.normal == NONE || normal.is_some_and(|n| n.iter().all(|x| x.is_finite()))
+    }
+
+    fn is_good(&self, corner: Corner) -> bool {
+        self.has_finite_position(corner) == Some(true) && self.has_good_uv(corner) && self.has_good_normal(corner)
+    }
+
+    /// Reads the faces once more: those with a vertex that is not finite are left out, and so are texture coordinates
+    /// and normals that do not exist.
+    fn mend(&mut self, not_finite: &mut Tally) -> Result<(), ImportError> {
+        let faces = std::mem::take(&mut self.model.faces);
+        let corners = std::mem::take(&mut self.model.corners);
+        let vertices = std::mem::take(&mut self.model.vertices);
+        let mut index = VertexIndex::default();
+        let mut kept = Vec::new();
+        for face in (0..faces.len()).map(|f| faces.get(f)) {
+            self.line = face.line;
+            kept.clear();
+            for &vertex in &corners[face.corners.clone()] {
+                let mut corner = vertices[vertex as usize];
+                match self.has_finite_position(corner) {
+                    None => return Err(self.no_vertex(i64::from(corner.position) + 1)),
+                    Some(true) => {}
+                    Some(false) => {
+                        not_finite.add(face.line);
+                        kept.clear();
+                        break;
+                    }
+                }
+                if !self.has_good_uv(corner) {
+                    self.bad_attribute.add(face.line);
+                    corner.uv = NONE;
+                }
+                if !self.has_good_normal(corner) {
+                    self.bad_attribute.add(face.line);
+                    corner.normal = NONE;
+                }
+                kept.push(corner);
+            }
+            if kept.is_empty() {
+                continue;
+            }
+            for &corner in &kept {
+                let vertex = index.add(corner, self.model.positions.len(), &mut self.model.vertices);
+                self.model.corners.push(vertex);
+            }
+            self.model.faces.push(kept.len() as u32, face.line, face.part, face.smoothing);
+        }
+        Ok(())
+    }
+}
+
+/// The indices of a corner as they are written, from 1 or counted back: of position, texture coordinates and normal.
+type Indices = [Option<i64>; 3];
+
+/// The corner that a text begins with, if it is written plainly, and what follows it.
+#[inline]
+fn plain_corner(text: &[u8]) -> Option<(Indices, &[u8])> {
+    let mut indices = [None; 3];
+    let mut at = 0;
+    for (field, index) in indices.iter_mut().enumerate() {
+        let negative = text.get(at) == Some(&b'-');
+        at += usize::from(negative);
+        let (start, mut value) = (at, 0_i64);
+        while let Some(digit) = text.get(at).map(|b| b.wrapping_sub(b'0')).filter(|d| *d < 10) {
+            value = 10 * value + i64::from(digit);
+            at += 1;
+            // Ten digits are more than there can be vertices.
+            if at - start > 10 {
+                return None;
+            }
+        }
+        match (at - start, negative) {
+            (0, true) => return None,
+            (0, false) if field == 0 => return None,
+            (0, false) => {}
+            (_, true) => *index = Some(-value),
+            (_, false) => *index = Some(value),
+        }
+        match text.get(at) {
+            None => return Some((indices, &[])),
+            Some(b'/') => at += 1,
+            Some(b) if b.is_ascii_whitespace() => return Some((indices, &text[at..])),
+            Some(_) => return None,
+        }
+    }
+    None
 }

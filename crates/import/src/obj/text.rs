@@ -2,6 +2,70 @@
 
 use std::borrow::Cow;
 
+use crate::ImportError;
+use crate::files::Input;
+
+/// A file in blocks of whole logical lines, so that not all of its text is held at once.
+pub(super) struct Blocks<'a> {
+    input: Input<'a>,
+    buffer: Vec<u8>,
+    /// What of the buffer the last block was.
+    used: usize,
+    ended: bool,
+}
+
+/// About so many bytes are held at once: they stay in the processor's cache.
+const BLOCK: usize = 1 << 18;
+
+impl<'a> Blocks<'a> {
+    /// The text is brought into UTF-8, without its byte order mark.
+    ///
+    /// # Errors
+    /// As for [`Blocks::next`].
+    pub(super) fn new(mut input: Input<'a>) -> Result<Self, ImportError> {
+        let mut buffer = Vec::new();
+        let mut ended = !input.read(BLOCK, &mut buffer)?;
+        if matches!(buffer.as_slice(), [0xfe, 0xff, ..] | [0xff, 0xfe, ..]) {
+            // Rare enough to be held as a whole.
+            while input.read(buffer.len(), &mut buffer)? {}
+            ended = true;
+        }
+        Ok(Self { input, buffer: to_utf8(buffer), used: 0, ended })
+    }
+
+    /// The next lines; `None` at the end.
+    ///
+    /// # Errors
+    /// If the file cannot be read or is too large.
+    pub(super) fn next(&mut self) -> Result<Option<&[u8]>, ImportError> {
+        self.buffer.drain(..self.used);
+        self.used = if self.ended { self.buffer.len() } else { end_of_lines(&self.buffer) };
+        while self.used == 0 && !self.ended {
+            // A longer and longer line is not searched again and again for its end.
+            self.ended = !self.input.read(self.buffer.len().max(BLOCK), &mut self.buffer)?;
+            self.used = if self.ended { self.buffer.len() } else { end_of_lines(&self.buffer) };
+        }
+        Ok((self.used > 0).then(|| &self.buffer[..self.used]))
+    }
+}
+
+/// Where the last logical line ends that is whole for certain.
+fn end_of_lines(text: &[u8]) -> usize {
+    let mut end = text.len();
+    while let Some(at) = text[..end].iter().rposition(|&b| b == b'\n' || b == b'\r') {
+        let before = match &text[..at] {
+            [before @ .., b'\r'] if text[at] == b'\n' => before,
+            before => before,
+        };
+        // After a CR at the end an LF may follow.
+        if !continues(before) && (text[at] == b'\n' || at + 1 < text.len()) {
+            return at + 1;
+        }
+        end = at;
+    }
+    0
+}
+
 /// The text in UTF-8, without its byte order mark. Without a mark the bytes are left as they are.
 pub(super) fn to_utf8(bytes: Vec<u8>) -> Vec<u8> {
     let utf16 = |rest: &[u8], unit: fn([u8; 2]) -> u16| {
@@ -34,8 +98,14 @@ pub(super) struct Lines<'a> {
 }
 
 impl<'a> Lines<'a> {
-    pub(super) fn new(text: &'a [u8]) -> Self {
-        Self { rest: text, next: 1, joined: Vec::new() }
+    /// The lines of a text that begins with line number `first`.
+    pub(super) fn new(text: &'a [u8], first: u32) -> Self {
+        Self { rest: text, next: first, joined: Vec::new() }
+    }
+
+    /// The number of the next physical line.
+    pub(super) fn number(&self) -> u32 {
+        self.next
     }
 
     /// The next line and the number of its first physical line, from 1.
@@ -89,6 +159,45 @@ pub(super) fn words(text: &[u8]) -> impl Iterator<Item = &[u8]> {
     text.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty()).take_while(|w| w[0] != b'#')
 }
 
+/// The number that a text begins with, if it is written plainly, and what follows it. White space or the end does.
+///
+/// Below 2^53 the digits are exact as f64, as are the powers of ten to 10^22: their quotient is the nearest to the number
+/// (Clinger, "How to read floating point numbers accurately", 1990). It is the same as [`number`] gives, sooner.
+#[inline]
+pub(super) fn plain_number(text: &[u8]) -> Option<(f64, &[u8])> {
+    const MOST: u64 = 1 << 53;
+    const POWERS: [f64; 23] = [
+        1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19,
+        1e20, 1e21, 1e22,
+    ];
+    let (negative, digits) = match text {
+        [b'-', rest @ ..] => (true, rest),
+        _ => (false, text),
+    };
+    let (mut mantissa, mut count, mut point) = (0_u64, 0, None);
+    let mut at = 0;
+    while let Some(&byte) = digits.get(at) {
+        let digit = byte.wrapping_sub(b'0');
+        if digit < 10 {
+            mantissa = mantissa.wrapping_mul(10).wrapping_add(u64::from(digit));
+            count += 1;
+        } else if byte == b'.' && point.is_none() {
+            point = Some(count);
+        } else if byte.is_ascii_whitespace() {
+            break;
+        } else {
+            return None;
+        }
+        at += 1;
+    }
+    // 19 digits do not overflow.
+    if !(1..=19).contains(&count) || mantissa > MOST {
+        return None;
+    }
+    let value = mantissa as f64 / POWERS[point.map_or(0, |before| count - before)];
+    Some((if negative { -value } else { value }, &digits[at..]))
+}
+
 /// A number, perhaps not a finite one. The C library of Windows writes those as `1.#INF` or `-1.#IND`.
 pub(crate) fn number(word: &[u8]) -> Option<f64> {
     match std::str::from_utf8(word).ok()?.parse() {
@@ -103,7 +212,7 @@ mod tests {
     use super::*;
 
     fn lines(text: &[u8]) -> Vec<(u32, String)> {
-        let mut lines = Lines::new(text);
+        let mut lines = Lines::new(text, 1);
         let mut out = Vec::new();
         while let Some((n, line)) = lines.next() {
             out.push((n, name(line).into_owned()));
@@ -148,6 +257,69 @@ mod tests {
         }
         for text in ["", "x", "1,5", "1/2", "--1"] {
             assert_eq!(number(text.as_bytes()), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn plain_numbers_are_the_nearest() {
+        let texts = [
+            "0",
+            "-0",
+            "7",
+            "1.",
+            ".5",
+            "-.5",
+            "0.1",
+            "0.032027",
+            "-0.0503644",
+            "123456789.123",
+            "9007199254740992",
+            "9007199254740993",
+            "0.1234567890123456",
+            "12345678901234567890",
+            "0.0000000000000000001",
+            "1.5e3",
+            "+2",
+            ".",
+            "-",
+            "",
+            "1.2.3",
+            "nan",
+            "1x",
+            "179.99999999999997",
+            "3.4028235",
+            "0000000000000000000001",
+        ];
+        for text in texts {
+            let Some((value, rest)) = plain_number(text.as_bytes()) else { continue };
+            let nearest = text.parse::<f64>().map(f64::to_bits);
+            assert_eq!((Ok(value.to_bits()), rest), (nearest, &b""[..]), "{text}");
+        }
+        assert_eq!(plain_number(b"-0.25\t7"), Some((-0.25, &b"\t7"[..])));
+        assert!(plain_number(b"0.1234567890123456").is_some_and(|(x, _)| x == 0.1234567890123456));
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn plain_numbers_are_what_the_standard_library_reads(text in "-?[0-9]{0,12}(\\.[0-9]{0,12})?") {
+            if let Some((value, _)) = plain_number(text.as_bytes()) {
+                proptest::prop_assert_eq!(Ok(value.to_bits()), text.parse::<f64>().map(f64::to_bits));
+            }
+        }
+
+        /// Cut anywhere, the lines are the same.
+        #[test]
+        fn blocks_are_whole_lines(text in "[a\\\\\r\n ]{0,40}", at in 0..40_usize) {
+            let text = text.as_bytes();
+            let end = end_of_lines(&text[..at.min(text.len())]);
+            let mut joined = lines(&text[..end]);
+            let first = joined.len();
+            let mut rest = Lines::new(&text[end..], 1);
+            while let Some((n, line)) = rest.next() {
+                joined.push((n, name(line).into_owned()));
+            }
+            let whole: Vec<_> = lines(text).into_iter().map(|(_, line)| line).collect();
+            proptest::prop_assert_eq!(whole, joined.into_iter().map(|(_, line)| line).collect::<Vec<_>>(), "{}", first);
         }
     }
 

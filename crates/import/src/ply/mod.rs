@@ -21,7 +21,7 @@ use std::path::Path;
 
 use self::header::{Element, Encoding, Header};
 use self::values::Values;
-use crate::obj::{Corner, Face, Model, NONE, Part};
+use crate::obj::model::{Corner, Model, NONE, Part};
 use crate::{ErrorKind, ImportError, Imported, Limits, Options, Report, files, plain};
 
 /// Reads a PLY file.
@@ -71,7 +71,7 @@ pub fn read_bytes(bytes: &[u8], path: impl AsRef<Path>, options: &Options) -> Re
         report.warn(path, "", format!("{few} faces with less than 3 corners left out"));
     }
     check_indices(&mut model, path, unit)?;
-    if !model.faces.is_empty() {
+    if model.faces.len() > 0 {
         model.parts.push(Part::default());
     }
     Ok(plain::scene(model, path, unit, report))
@@ -213,7 +213,7 @@ impl Reader<'_> {
                     for _ in 0..count {
                         let index = self.value(element, face, property, property.kind)?;
                         let position = self.index(element, face, index, strips)?;
-                        self.model.corners.push(Corner { position, uv: NONE, normal: NONE });
+                        self.model.corners.push(position);
                     }
                     if strips { self.strip(start, line)? } else { self.polygon(start, line)? }
                 }
@@ -242,7 +242,7 @@ impl Reader<'_> {
             return Ok(());
         }
         self.check_corners(self.model.corners.len() as u64)?;
-        self.model.faces.push(Face { start: start as u32, len: len as u32, line, part: 0, smoothing: 0 });
+        self.model.faces.push(len as u32, line, 0, 0);
         Ok(())
     }
 
@@ -260,7 +260,7 @@ impl Reader<'_> {
     /// Makes triangles of the strips from corner `start` on.
     fn strip(&mut self, start: usize, line: u32) -> Result<(), ImportError> {
         let corners = self.model.corners.split_off(start);
-        for strip in corners.split(|c| c.position == NONE) {
+        for strip in corners.split(|&c| c == NONE) {
             for (i, w) in strip.windows(3).enumerate() {
                 let start = self.model.corners.len();
                 let turned = if i % 2 == 0 { [w[0], w[1], w[2]] } else { [w[0], w[2], w[1]] };
@@ -326,24 +326,20 @@ impl Reader<'_> {
     }
 }
 
-/// Checks that all corners are vertices, and gives them what the vertices have.
+/// Checks that all corners are vertices, and makes a vertex of each position, with what the file gives it.
 fn check_indices(model: &mut Model, path: &Path, unit: &str) -> Result<(), ImportError> {
     let count = model.positions.len();
-    let (has_normals, has_uvs) = (!model.normals.is_empty(), !model.uvs.is_empty());
-    for face in &model.faces {
-        for corner in &mut model.corners[face.range()] {
-            let index = corner.position as usize;
-            if index >= count {
-                let cause = format!("vertex {index} does not exist: there are {count}");
-                return Err(ImportError::invalid(path, format!("{unit} {}", face.line), cause));
-            }
-            if has_normals && model.normals[index] != [0.0; 3] {
-                corner.normal = corner.position;
-            }
-            if has_uvs && model.uvs[index].iter().all(|x| x.is_finite()) {
-                corner.uv = corner.position;
-            }
-        }
+    if let Some(at) = model.corners.iter().position(|&index| index as usize >= count) {
+        let cause = format!("vertex {} does not exist: there are {count}", model.corners[at]);
+        let line = model.faces.line(model.faces.of_corner(at));
+        return Err(ImportError::invalid(path, format!("{unit} {line}"), cause));
+    }
+    model.vertices.reserve_exact(count);
+    for position in 0..count as u32 {
+        let normal = model.normals.get(position as usize).is_some_and(|n| *n != [0.0; 3]);
+        let uv = model.uvs.get(position as usize).is_some_and(|uv| uv.iter().all(|x| x.is_finite()));
+        let index = |there: bool| if there { position } else { NONE };
+        model.vertices.push(Corner { position, uv: index(uv), normal: index(normal) });
     }
     Ok(())
 }

@@ -10,7 +10,8 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use crate::obj::{Corner, Face, Model, NONE, Part, number};
+use crate::obj::model::{Corner, Model, NONE, Part};
+use crate::obj::number;
 use crate::{ErrorKind, ImportError, Imported, Limits, Options, Report, files, plain};
 
 /// Bytes before the triangles of a binary file: a comment and their number.
@@ -171,7 +172,7 @@ impl Builder<'_> {
     /// Ends the solid of the faces since the last one.
     fn part(&mut self, name: &str) {
         let part = self.model.parts.len() as u32;
-        if self.model.faces.last().is_some_and(|f| f.part == part) {
+        if self.model.faces.last_part() == Some(part) {
             self.model.parts.push(Part { object: name.to_owned(), ..Part::default() });
         }
     }
@@ -183,8 +184,10 @@ impl Builder<'_> {
         let position = *self.known.entry(key).or_insert(next);
         if position == next {
             self.model.positions.push(place.map(f64::from));
+            self.model.vertices.push(Corner { position, uv: NONE, normal: NONE });
         }
-        self.model.corners.push(Corner { position, uv: NONE, normal: NONE });
+        // A vertex for each position.
+        self.model.corners.push(position);
     }
 
     /// Makes a face of the corners from `start` on, of which there are at least 3.
@@ -193,7 +196,7 @@ impl Builder<'_> {
         self.triangles += u64::from(len.saturating_sub(2));
         self.check_room(self.triangles)?;
         let part = self.model.parts.len() as u32;
-        self.model.faces.push(Face { start: start as u32, len, line, part, smoothing: 0 });
+        self.model.faces.push(len, line, part, 0);
         Ok(())
     }
 
