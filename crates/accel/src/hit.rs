@@ -55,7 +55,7 @@ impl Hit {
     /// let hit = builder.build()?.closest_hit(&Ray::new(DVec3::new(0.75, 0.5, 2.0), DVec3::NEG_Z)).unwrap();
     ///
     /// let vertices = triangles[hit.id.primitive as usize];
-    /// assert_eq!(hit.interpolate(vertices.map(|i: usize| texture_coordinates[i])), Vec2::new(0.75, 0.5));
+    /// assert_eq!(hit.interpolate(vertices.map(|i: u32| texture_coordinates[i as usize])), Vec2::new(0.75, 0.5));
     /// # Ok::<(), firsthit_accel::BuildError>(())
     /// ```
     #[inline]

@@ -557,7 +557,20 @@ impl Model {
                 let of = (instance, transform);
                 let work =
                     TraceWide::<SURFACES, Wide8, K, C, P> { model: self, tree, ray, of, collector, probe, kernel };
-                simd::run(*level, work)
+                simd::by_vectors(*level, work).unwrap_or_else(|work| {
+                    // In plain Rust, which is large, as below.
+                    let TraceWide { model, tree, ray, of, collector, probe, kernel } = work;
+                    let (collector, probe) = (&mut Dyn(collector), &mut DynProbe(probe));
+                    simd::portable(TraceWide::<SURFACES, Wide8, K, _, _> {
+                        model,
+                        tree,
+                        ray,
+                        of,
+                        collector,
+                        probe,
+                        kernel,
+                    })
+                })
             }
             // Compiled once for any collector and any probe.
             MeshTree::Compact { tree, level } => {

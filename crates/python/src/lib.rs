@@ -4,6 +4,7 @@
 #![allow(missing_docs, unreachable_pub)]
 
 mod arrays;
+mod change;
 mod error;
 mod hits;
 mod mesh;

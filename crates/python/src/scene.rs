@@ -13,9 +13,10 @@ use pyo3::types::{PyDict, PyTuple};
 use rayon::prelude::*;
 
 use crate::arrays::triangles;
+use crate::change;
 use crate::error;
 use crate::hits::{ClosestPoints, Found, HitLists, Hits, Slots};
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, once, rows};
 use crate::points;
 use crate::pool::pool;
 use crate::rays::Rays;
@@ -39,6 +40,8 @@ pub struct Scene {
     scene: firsthit_accel::Scene,
     pub(crate) source: Source,
     warnings: Vec<String>,
+    /// Only instances of these groups are met.
+    mask: u32,
     /// By how inside is told from outside; made when it is first asked about.
     pub(crate) solids: Mutex<Vec<(Option<SignMethod>, Arc<Solid>)>>,
 }
@@ -95,7 +98,18 @@ impl Scene {
     fn of_mesh(py: Python<'_>, mesh: Mesh, options: BuildOptions, threads: usize) -> PyResult<Self> {
         let pool = pool(threads)?;
         let scene = py.detach(|| pool.install(|| mesh.build(options))).map_err(error::value)?;
-        Ok(Self { scene, source: Source::Arrays(Arc::new(mesh)), warnings: Vec::new(), solids: Mutex::default() })
+        let (source, warnings) = (Source::Arrays(Arc::new(mesh)), Vec::new());
+        Ok(Self { scene, source, warnings, mask: u32::MAX, solids: Mutex::default() })
+    }
+
+    /// As this one, but of other trees.
+    pub(crate) fn of_trees(&self, scene: firsthit_accel::Scene, source: Source) -> Self {
+        Self { scene, source, warnings: self.warnings.clone(), mask: self.mask, solids: Mutex::default() }
+    }
+
+    /// With instances of these groups only.
+    fn masked(&self, mask: u32) -> Self {
+        Self { mask, ..self.of_trees(self.scene.seen_by(mask), self.source.clone()) }
     }
 
     fn open(py: Python<'_>, source: Source, options: BuildOptions, threads: usize) -> PyResult<Self> {
@@ -107,7 +121,7 @@ impl Scene {
                 PyResult::Ok((scene, warnings))
             })
         })?;
-        Ok(Self { scene, source, warnings, solids: Mutex::default() })
+        Ok(Self { scene, source, warnings, mask: u32::MAX, solids: Mutex::default() })
     }
 
     pub(crate) fn trees(&self) -> &firsthit_accel::Scene {
@@ -166,17 +180,20 @@ pub(crate) fn in_chunks<Q, P: Send>(
 #[pymethods]
 impl Scene {
     #[new]
-    #[pyo3(signature = (vertices, triangles=None, *, precision="robust", quality="balanced", threads=0))]
+    #[pyo3(signature = (vertices, triangles=None, *, transforms=None, masks=None, precision="robust", quality="balanced", threads=0))]
+    #[allow(clippy::too_many_arguments, reason = "named in Python")]
     fn new(
         py: Python<'_>,
         vertices: &Bound<'_, PyAny>,
         triangles: Option<&Bound<'_, PyAny>>,
+        transforms: Option<&Bound<'_, PyAny>>,
+        masks: Option<&Bound<'_, PyAny>>,
         precision: &str,
         quality: &str,
         threads: usize,
     ) -> PyResult<Self> {
         let options = build_options(precision, quality)?;
-        let mesh = match triangles {
+        let mut mesh = match triangles {
             Some(triangles) => Mesh::new(vertices, self::triangles(triangles)?)?,
             // A mesh of trimesh, or of Open3D.
             None if vertices.hasattr("vertices")? => {
@@ -185,7 +202,28 @@ impl Scene {
             }
             None => return Err(error::value("vertices and triangles are needed, or an object that has them")),
         };
+        mesh.place(transforms, masks)?;
         Self::of_mesh(py, mesh, options, threads)
+    }
+
+    #[pyo3(signature = (vertices, *, threads=0))]
+    fn refit(&self, py: Python<'_>, vertices: &Bound<'_, PyAny>, threads: usize) -> PyResult<Self> {
+        change::refit(py, self, vertices, threads)
+    }
+
+    #[pyo3(signature = (transforms, *, masks=None, threads=0))]
+    fn with_transforms(
+        &self,
+        py: Python<'_>,
+        transforms: &Bound<'_, PyAny>,
+        masks: Option<&Bound<'_, PyAny>>,
+        threads: usize,
+    ) -> PyResult<Self> {
+        change::with_transforms(py, self, transforms, masks, threads)
+    }
+
+    fn seen_by(&self, mask: u32) -> Self {
+        self.masked(mask)
     }
 
     #[pyo3(signature = (rays, directions=None, *, t_min=None, t_max=None, threads=0))]
@@ -407,11 +445,14 @@ impl Scene {
                 let positions: Vec<f32> = mesh.positions.iter().flat_map(|p| p.to_array()).collect();
                 let positions = PyArray1::from_vec(py, positions);
                 let triangles = PyArray1::from_vec(py, mesh.triangles.as_flattened().to_vec());
-                let arguments = (positions, triangles, mesh.origin.to_array(), precision, quality);
+                let transforms = PyArray1::from_vec(py, rows(&mesh.places)).reshape([mesh.places.len(), 4, 4])?;
+                let masks: Vec<u32> = mesh.places.iter().map(|(_, mask)| *mask).collect();
+                let origin = mesh.origin.to_array();
+                let arguments = (positions, triangles, origin, precision, quality, transforms, masks, self.mask);
                 (module.getattr("_restore")?, arguments).into_pyobject(py)
             }
             Source::File { path, up, variant } => {
-                let arguments = (path, precision, quality, up, variant);
+                let arguments = (path, precision, quality, up, variant, self.mask);
                 (module.getattr("_reload")?, arguments).into_pyobject(py)
             }
         }
@@ -445,12 +486,14 @@ pub fn reload(
     quality: &str,
     up: Option<String>,
     variant: Option<String>,
+    mask: u32,
 ) -> PyResult<Scene> {
-    load(py, path, precision, quality, up, variant, 0)
+    Ok(load(py, path, precision, quality, up, variant, 0)?.masked(mask))
 }
 
 /// A scene of arrays that was pickled.
 #[pyfunction(name = "_restore")]
+#[allow(clippy::too_many_arguments, reason = "what a scene is made of")]
 pub fn restore(
     py: Python<'_>,
     positions: &Bound<'_, PyArray1<f32>>,
@@ -458,15 +501,20 @@ pub fn restore(
     origin: [f64; 3],
     precision: &str,
     quality: &str,
+    transforms: &Bound<'_, PyAny>,
+    masks: &Bound<'_, PyAny>,
+    mask: u32,
 ) -> PyResult<Scene> {
     let positions = positions.try_readonly().map_err(error::value)?;
     let triangles = triangles.try_readonly().map_err(error::value)?;
     let positions = positions.as_slice().map_err(error::value)?.as_chunks::<3>().0;
     let triangles = triangles.as_slice().map_err(error::value)?.as_chunks::<3>().0;
-    let mesh = Mesh {
+    let mut mesh = Mesh {
         positions: positions.iter().copied().map(Vec3::from).collect(),
         triangles: triangles.to_vec(),
         origin: DVec3::from(origin),
+        places: once(),
     };
-    Scene::of_mesh(py, mesh, build_options(precision, quality)?, 0)
+    mesh.place(Some(transforms), Some(masks))?;
+    Ok(Scene::of_mesh(py, mesh, build_options(precision, quality)?, 0)?.masked(mask))
 }

@@ -189,13 +189,25 @@ pub(crate) fn prefetch<T>(what: &T) {
 /// Does the work by the instructions of a level.
 #[inline(always)]
 pub(crate) fn run<W: Work>(level: Available, work: W) -> W::Output {
+    by_vectors(level, work).unwrap_or_else(portable)
+}
+
+/// The same, if these are not plain Rust, which is large when compiled: then the work comes back.
+#[inline(always)]
+pub(crate) fn by_vectors<W: Work>(level: Available, work: W) -> Result<W::Output, W> {
     match level.0 {
         // SAFETY: an `Available` is made only of levels that the processor has.
         #[cfg(target_arch = "x86_64")]
-        Level::Avx2 => unsafe { avx2::run(work) },
+        Level::Avx2 => Ok(unsafe { avx2::run(work) }),
         // SAFETY: as above.
         #[cfg(target_arch = "x86_64")]
-        Level::Avx512 => unsafe { avx512::run(work) },
-        _ => work.run::<Portable>(),
+        Level::Avx512 => Ok(unsafe { avx512::run(work) }),
+        _ => Err(work),
     }
+}
+
+/// Work in plain Rust. A function of its own, as the others are: compiled once for each work, not for each caller.
+#[inline(never)]
+pub(crate) fn portable<W: Work>(work: W) -> W::Output {
+    work.run::<Portable>()
 }

@@ -137,6 +137,8 @@ class Scene:
         vertices: ArrayLike | Any,
         triangles: ArrayLike | None = None,
         *,
+        transforms: ArrayLike | None = None,
+        masks: ArrayLike | None = None,
         precision: _Precision = "robust",
         quality: _Quality = "balanced",
         threads: int = 0,
@@ -146,8 +148,27 @@ class Scene:
 
         Vertices are stored in 32 bits, as seen from the middle of the mesh where that loses less.
 
+        ``transforms``: matrices ``(n, 4, 4)`` from the mesh to the world, one for each instance; as it stands, one instance
+        where the vertices are. ``masks``: a number of 32 bits for each instance, see `seen_by`.
+
         Raises ValueError: for shapes that do not fit, vertices that are not finite, indices of no vertex.
         """
+    def refit(self, vertices: ArrayLike, *, threads: int = 0) -> Scene:
+        """This scene with its vertices moved, ``(n, 3)``: the tree gets new boxes, which is quicker than building, or is
+        built anew where that would make it half as costly again. This scene stays as it is.
+
+        Raises ValueError: as the constructor, for another number of vertices, and for scenes of files.
+        """
+    def with_transforms(
+        self, transforms: ArrayLike, *, masks: ArrayLike | None = None, threads: int = 0
+    ) -> Scene:
+        """This scene with its instances elsewhere: matrices ``(n, 4, 4)``. Of more there are more instances, of fewer the last
+        are gone. The mesh and its tree are shared with this scene, which stays as it is.
+
+        Raises ValueError: for matrices that are not affine or cannot be inverted, and for scenes of files.
+        """
+    def seen_by(self, mask: int) -> Scene:
+        """This scene for queries that meet only the instances whose mask has one of these bits. Everything is shared."""
     def closest_hit(
         self,
         rays: ArrayLike,
