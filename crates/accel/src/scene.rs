@@ -62,6 +62,8 @@ pub(crate) struct Inner {
     /// Instances of models with shapes of no finite box, which are tested outside the tree.
     unbounded: Vec<u32>,
     bounds: Aabb<f64>,
+    /// Around the boxes of all instances, which are larger.
+    whole: Aabb<f64>,
     /// The largest [`round_trip`](firsthit_geometry::transform::Transform::round_trip) of an instance.
     round_trip: f64,
     stats: SceneStats,
@@ -175,10 +177,12 @@ impl Scene {
             bounded,
             unbounded,
             bounds,
+            whole: bounds,
             round_trip,
             stats,
         };
         inner.stats = inner.stats();
+        inner.whole = inner.placed_boxes();
         Self { inner: Arc::new(inner) }
     }
 
@@ -329,6 +333,11 @@ impl Scene {
 impl Inner {
     pub(crate) fn above(&self) -> &Above {
         &self.above
+    }
+
+    /// Where queries about regions begin.
+    pub(crate) fn whole(&self) -> Aabb<f64> {
+        self.whole
     }
 
     /// The instance that has a box's number in the tree above.

@@ -77,8 +77,12 @@ impl Inner {
             Some(node) => Place::Above(node),
             None => Place::Run(0, count),
         };
-        let bounds = (0..count).fold(Aabb::empty(), |all: Aabb<f64>, k| all.union(self.placed_box(k).1));
-        Some(Cursor { place, bounds })
+        Some(Cursor { place, bounds: self.whole() })
+    }
+
+    /// A box around the boxes of all instances.
+    pub(crate) fn placed_boxes(&self) -> Aabb<f64> {
+        (0..self.bounded_count()).fold(Aabb::empty(), |all: Aabb<f64>, k| all.union(self.placed_box(k).1))
     }
 
     /// The instance at a place of the order above, and its box.
