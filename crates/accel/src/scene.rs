@@ -188,8 +188,24 @@ impl Scene {
 
     /// The nearest hit that `accept` accepts, other than on the flat primitive `source` that the ray starts from.
     ///
-    /// `accept` is asked about candidates in any order, and not about all of them. Their normal is not that of the world
-    /// yet: it is in the object's space, and of any length.
+    /// `accept` is asked about candidates in any order, and not about all of them; they are as the query would give them. So
+    /// alpha tests, masks of single rays and the culling of one side are written in a line:
+    ///
+    /// ```
+    /// use firsthit_accel::{Geometry, SceneBuilder};
+    /// use firsthit_geometry::{Ray, shapes::Sphere};
+    /// use glam::{DAffine3, DVec3};
+    ///
+    /// let mut builder = SceneBuilder::default();
+    /// let ball = builder.add_mesh(vec![Geometry::Shape(Sphere::new(DVec3::ZERO, 1.0)?.into())]);
+    /// builder.add_instance(ball, DAffine3::from_scale(DVec3::new(1.0, 1.0, -2.0)));
+    /// let scene = builder.build()?;
+    /// let ray = Ray::new(DVec3::Z * 9.0, DVec3::NEG_Z);
+    /// let front = scene.closest_hit_filtered(&ray, None, |hit| hit.normal_direction.dot(ray.direction) < 0.0);
+    /// let back = scene.closest_hit_filtered(&ray, None, |hit| hit.normal_direction.dot(ray.direction) > 0.0);
+    /// assert_eq!((front.unwrap().t, back.unwrap().t), (7.0, 11.0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// A curved shape is never skipped, since a ray may well meet it again: [`crate::SurfacePoint::spawn`] sees to it
     /// that the ray does not start behind its own surface.
@@ -198,9 +214,10 @@ impl Scene {
         &self,
         ray: &Ray<f64>,
         source: Option<HitId>,
-        accept: impl FnMut(&Hit) -> bool,
+        mut accept: impl FnMut(&Hit) -> bool,
     ) -> Option<Hit> {
         let order = |a, b| self.comes_first(ray, a, b);
+        let accept = |hit: &Hit| accept(&self.finished(*hit));
         let mut closest = Collect::new(ray, self.flat(source), accept, Closest { order, best: None });
         // It never breaks: the nearest hit is known at the end only.
         let _ = self.collect(ray, Crossings::Triangles, &mut closest);
@@ -210,8 +227,13 @@ impl Scene {
     /// As [`Scene::any_hit`] with a filter: see [`Scene::closest_hit_filtered`]. A filter that always says no is asked
     /// about every hit exactly once.
     #[must_use]
-    pub fn any_hit_filtered(&self, ray: &Ray<f64>, source: Option<HitId>, accept: impl FnMut(&Hit) -> bool) -> bool {
-        let mut any = Collect::new(ray, self.flat(source), accept, Any);
+    pub fn any_hit_filtered(
+        &self,
+        ray: &Ray<f64>,
+        source: Option<HitId>,
+        mut accept: impl FnMut(&Hit) -> bool,
+    ) -> bool {
+        let mut any = Collect::new(ray, self.flat(source), |hit| accept(&self.finished(*hit)), Any);
         self.collect(ray, Crossings::Triangles, &mut any).is_break()
     }
 

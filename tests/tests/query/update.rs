@@ -159,6 +159,38 @@ proptest! {
         }
     }
 
+    /// A filter sees the hits that users get, wherever the instance is: here all of them, and those of one side.
+    #[test]
+    fn filters_see_hits_as_they_are_given(
+        mesh in mesh(), places in prop::collection::vec(place(), 1..4), ends in prop::collection::vec((vector(), vector()), 12),
+    ) {
+        for layout in Layout::ALL {
+            let mut builder = SceneBuilder::new(BuildOptions { layout, ..BuildOptions::default() });
+            let m = builder.add_mesh(vec![triangles(&mesh)]);
+            places.iter().for_each(|at| _ = builder.add_instance(m, *at));
+            let scene = builder.build().expect("a good mesh");
+            let at = |p: DVec3| scene.bounds().center() + p * scene.bounds().extent();
+            for (a, b) in &ends {
+                let ray = Ray::new(at(*a), at(*b) - at(*a));
+                let mut seen = Vec::new();
+                let keep = |hit: &Hit| {
+                    seen.push(*hit);
+                    false
+                };
+                prop_assert!(!scene.any_hit_filtered(&ray, None, keep));
+                seen.sort_by(|a, b| (a.t, a.id).partial_cmp(&(b.t, b.id)).expect("numbers"));
+                let all = scene.all_hits(&ray, Crossings::Triangles);
+                prop_assert_eq!(&seen, &all);
+                for side in [-1.0, 1.0] {
+                    let on_side = |hit: &Hit| hit.normal_direction.dot(ray.direction) * side > 0.0;
+                    let first = all.iter().copied().find(on_side);
+                    prop_assert_eq!(scene.closest_hit_filtered(&ray, None, on_side), first);
+                    prop_assert_eq!(scene.any_hit_filtered(&ray, None, on_side), first.is_some());
+                }
+            }
+        }
+    }
+
     #[test]
     fn groups_are_the_instances_they_hold(
         mesh in mesh(), inner in prop::collection::vec(place(), 0..4), outer in prop::collection::vec((any::<bool>(), place()), 0..4),
