@@ -4,7 +4,7 @@ use firsthit_geometry::transform::Transform;
 use glam::{DAffine3, DMat3, DVec3, Vec4};
 
 use crate::scene::{InstanceDesc, MeshDesc, SurfaceDesc, TriangleMesh};
-use crate::{ErrorKind, Limits, SceneDesc};
+use crate::{ErrorKind, Limits, SceneDesc, unit};
 
 impl SceneDesc {
     /// Leaves only instances with a transform that is usable: one for which there is a [`Transform`].
@@ -100,12 +100,12 @@ pub(crate) fn deform(mesh: &mut TriangleMesh, transform: impl Fn(usize) -> DAffi
             let b = a * (1.0 / largest(a));
             let cofactors =
                 DMat3::from_cols(b.y_axis.cross(b.z_axis), b.z_axis.cross(b.x_axis), b.x_axis.cross(b.y_axis));
-            let moved = (cofactors * normal.as_dvec3() * side).try_normalize();
+            let moved = unit::double(cofactors * normal.as_dvec3() * side);
             flat |= moved.is_none();
             *normal = moved.unwrap_or(DVec3::Z).as_vec3();
         }
         if let Some(tangent) = mesh.tangents.get_mut(v) {
-            let moved = (a * tangent.truncate().as_dvec3()).try_normalize();
+            let moved = unit::double(a * tangent.truncate().as_dvec3());
             *tangent = moved.map_or(Vec4::ZERO, |t| t.as_vec3().extend(tangent.w * side as f32));
         }
     }

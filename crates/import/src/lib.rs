@@ -37,6 +37,7 @@ pub mod stl;
 #[cfg(test)]
 mod tests;
 pub mod toml;
+mod unit;
 
 pub use cache::ImageCache;
 pub use error::{ErrorKind, ImportError};

@@ -1,7 +1,7 @@
 //! Primitives of meshes: vertex attributes, indices, topologies, morph targets
 //! (glTF 2.0 specification, section 3.7.2).
 
-use glam::{Affine2, Vec3, Vec4};
+use glam::{Affine2, DVec3, Vec3, Vec4};
 use gltf::json::mesh::{Mode, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{self, Index};
@@ -15,7 +15,7 @@ use super::stroke::{self, Strokes};
 use super::tangent;
 use super::variant;
 use crate::scene::TriangleMesh;
-use crate::{ErrorKind, ImportError, Report};
+use crate::{ErrorKind, ImportError, Report, unit};
 
 /// Triangles as the file has them: morph targets applied, normals and tangents only where they are given.
 pub(super) struct Primitive {
@@ -342,26 +342,26 @@ fn compact(primitive: &mut Primitive) {
 fn tidy(mesh: &mut TriangleMesh, mut warn: impl FnMut(String)) {
     let mut bad = Vec::new();
     for (v, n) in mesh.normals.iter_mut().enumerate() {
-        match n.try_normalize() {
+        match unit::single(*n) {
             Some(unit) => *n = unit,
             None => bad.push(v),
         }
     }
     if !bad.is_empty() {
         warn(format!("{} normals have no direction: those of the triangles around are taken", bad.len()));
-        let mut around = vec![Vec3::ZERO; mesh.positions.len()];
+        let mut around = vec![DVec3::ZERO; mesh.positions.len()];
         for t in &mesh.triangles {
-            let [a, b, c] = t.map(|v| mesh.positions[v as usize]);
+            let [a, b, c] = t.map(|v| mesh.positions[v as usize].as_dvec3());
             t.iter().for_each(|&v| around[v as usize] += (b - a).cross(c - a));
         }
-        bad.into_iter().for_each(|v| mesh.normals[v] = around[v].try_normalize().unwrap_or(Vec3::Z));
+        bad.into_iter().for_each(|v| mesh.normals[v] = unit::double(around[v]).unwrap_or(DVec3::Z).as_vec3());
     }
     if mesh.normals.is_empty() {
         mesh.tangents.clear();
     }
     let mut lost = false;
     for t in &mut mesh.tangents {
-        match t.truncate().try_normalize() {
+        match unit::single(t.truncate()) {
             Some(unit) => *t = unit.extend(if t.w < 0.0 { -1.0 } else { 1.0 }),
             None => lost = true,
         }

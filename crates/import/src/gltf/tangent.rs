@@ -4,6 +4,7 @@ use bevy_mikktspace::{Geometry, TangentSpace};
 use glam::{Affine2, Vec2, Vec3, Vec4};
 
 use crate::scene::TriangleMesh;
+use crate::unit;
 
 /// Gives a mesh tangents for a texture. Vertices at which they differ between triangles are split.
 ///
@@ -114,7 +115,7 @@ fn flatten(mesh: &mut TriangleMesh) {
     spread(&mut mesh.positions, &triangles);
     spread(&mut mesh.colors, &triangles);
     mesh.uvs.iter_mut().for_each(|set| spread(set, &triangles));
-    let face = |p: &[Vec3]| (p[1] - p[0]).cross(p[2] - p[0]).try_normalize().unwrap_or(Vec3::Z);
+    let face = |p: &[Vec3]| unit::single((p[1] - p[0]).cross(p[2] - p[0])).unwrap_or(Vec3::Z);
     mesh.normals = mesh.positions.chunks_exact(3).flat_map(|p| [face(p); 3]).collect();
     mesh.triangles = (0..triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
 }

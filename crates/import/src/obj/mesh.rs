@@ -9,7 +9,7 @@ use super::model::{Corner, Model, NONE, VertexIndex};
 use super::normals;
 use super::polygon::{Outcome, Triangulator, area_vector};
 use crate::scene::TriangleMesh;
-use crate::{Report, srgb};
+use crate::{Report, srgb, unit};
 
 /// The triangles of all parts of a model.
 pub(crate) struct Meshes {
@@ -208,7 +208,7 @@ fn face_normals(model: &Model, outlines: &[Outline]) -> Vec<(u32, Vec3)> {
     let mut places = Vec::new();
     faces
         .into_iter()
-        .map(|f| (f, normals::of_face(model, f as usize, &mut places).normalize_or(DVec3::Z).as_vec3()))
+        .map(|f| (f, unit::double(normals::of_face(model, f as usize, &mut places)).unwrap_or(DVec3::Z).as_vec3()))
         .collect()
 }
 

@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use super::model::{Corner, Model, NONE};
 use super::polygon::area_vector;
+use crate::unit;
 
 /// Faces that meet at less than this angle look round in files that say nothing about shading.
 const CREASE_DEGREES: f64 = 40.0;
@@ -135,7 +136,7 @@ fn by_groups(model: &mut Model) {
             }
             model.corners[corner] = *smooth;
         }
-        model.normals.extend(sums.iter().map(|n| n.normalize_or(DVec3::Z).as_vec3().to_array()));
+        model.normals.extend(sums.iter().map(|&n| unit::double(n).unwrap_or(DVec3::Z).as_vec3().to_array()));
         touched.drain(..).for_each(|vertex| smooth_of[vertex as usize] = NONE);
         for face in groups[&group].iter().cloned().flatten() {
             for &corner in model.corners_of(face) {
@@ -267,7 +268,7 @@ fn at_creases(model: &mut Model, welded: &[u32], creased: &[bool], count: &[u32]
         let first = model.normals.len();
         for (&c, &(own, _)) in around.iter().zip(&weighted) {
             let patch = weighted.iter().filter(|(n, _)| n.dot(own) > least);
-            let normal = match patch.map(|(_, w)| w).sum::<DVec3>().try_normalize() {
+            let normal = match unit::double(patch.map(|(_, w)| w).sum::<DVec3>()) {
                 None => NONE,
                 Some(normal) => {
                     let normal = normal.as_vec3().to_array();

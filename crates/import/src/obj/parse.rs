@@ -6,7 +6,7 @@ use std::path::Path;
 use super::model::{Corner, Model, NONE, Part, VertexIndex};
 use super::text::{Blocks, Lines, name, number, plain_number, split_keyword, words};
 use crate::files::Input;
-use crate::{ErrorKind, ImportError, Limits, Report};
+use crate::{ErrorKind, ImportError, Limits, Report, unit};
 
 /// How often something came up, and where first.
 #[derive(Default)]
@@ -211,7 +211,7 @@ impl<'a> Parser<'a> {
             return Err(self.invalid(format!("a normal needs 3 numbers, here are {count}")));
         }
         self.check_count(self.model.normals.len() as u64 + 1, "normals")?;
-        let unit = glam::DVec3::from_array(n).try_normalize();
+        let unit = unit::double(glam::DVec3::from_array(n));
         if unit.is_none() {
             self.bad_attribute.add(self.line);
         }

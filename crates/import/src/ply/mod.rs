@@ -22,7 +22,7 @@ use std::path::Path;
 use self::header::{Element, Encoding, Header};
 use self::values::Values;
 use crate::obj::model::{Corner, Model, NONE, Part};
-use crate::{ErrorKind, ImportError, Imported, Limits, Options, Report, files, plain};
+use crate::{ErrorKind, ImportError, Imported, Limits, Options, Report, files, plain, unit};
 
 /// Reads a PLY file.
 ///
@@ -179,7 +179,7 @@ impl Reader<'_> {
             }
             self.model.positions.push(position);
             if has_normals {
-                let unit = glam::DVec3::from(normal).try_normalize().unwrap_or(glam::DVec3::ZERO);
+                let unit = unit::double(glam::DVec3::from(normal)).unwrap_or(glam::DVec3::ZERO);
                 self.model.normals.push(unit.as_vec3().to_array());
             }
             if has_colors {

@@ -9,6 +9,7 @@ use super::place::between;
 use super::schema::{Model, Shape};
 use super::values::{Pair, Triple, positive};
 use crate::scene::TriangleMesh;
+use crate::unit;
 
 /// What an object is.
 pub(super) enum Body<'a> {
@@ -124,7 +125,7 @@ fn mesh(
         return Err(format!("positions[{i}] is too large"));
     }
     let unit = |(i, n): (usize, &Triple)| {
-        n.0.try_normalize().map(|n| n.as_vec3()).ok_or_else(|| format!("normals[{i}] has no direction"))
+        unit::double(n.0).map(|n| n.as_vec3()).ok_or_else(|| format!("normals[{i}] has no direction"))
     };
     Ok(TriangleMesh {
         positions: narrow,

@@ -1,0 +1,2 @@
+#![no_main]
+firsthit_fuzz::files!(mtl);
