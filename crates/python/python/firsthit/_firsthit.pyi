@@ -206,8 +206,7 @@ class Scene:
         *,
         t_min: ArrayLike | None = None,
         t_max: ArrayLike | None = None,
-        crossings: _Sign = Literal["auto", "winding", "fast_winding", "parity", "pseudonormal", "exact"]
-_Crossings = "triangles",
+        crossings: _Crossings = "triangles",
         threads: int = 0,
     ) -> NDArray[np.uint32]:
         """How often each ray meets something.
@@ -222,8 +221,7 @@ _Crossings = "triangles",
         *,
         t_min: ArrayLike | None = None,
         t_max: ArrayLike | None = None,
-        crossings: _Sign = Literal["auto", "winding", "fast_winding", "parity", "pseudonormal", "exact"]
-_Crossings = "triangles",
+        crossings: _Crossings = "triangles",
         threads: int = 0,
     ) -> HitLists:
         """Everything that each ray meets; for ``crossings`` see `count_hits`."""
