@@ -33,4 +33,4 @@ b.imshow(np.where(hits.hit[..., None], (hits.primitive_normals + 1) / 2, 1.0))
 for axes, title in ((a, "scene.closest_hit(...).t_hit"), (b, "...primitive_normals")):
     axes.set_title(title, fontsize=10)
     axes.axis("off")
-figure.savefig(picture, dpi=80)
+figure.savefig(picture, dpi=70)
