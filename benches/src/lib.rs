@@ -7,7 +7,11 @@
 //! * `cargo run --release -p firsthit-benches --bin effects`: what it buys that scenes are rendered by kernels without the
 //!   effects that they do not call for.
 //! * `cargo run --release -p firsthit-benches --bin leaks`: rays lost through closed meshes, firsthit beside its peers.
+//! * `cargo run --release -p firsthit-benches --bin points`: closest points, signed distances, inside and outside beside peers,
+//!   and what one query a call costs.
+//! * `cargo run --release -p firsthit-benches --bin brute`: every answer of firsthit against all triangles, decided exactly.
 
+pub mod brute;
 pub mod effects;
 pub mod engine;
 pub mod generated;
@@ -16,6 +20,7 @@ pub mod judge;
 pub mod memory;
 pub mod model;
 pub mod peer;
+pub mod points;
 pub mod race;
 pub mod random;
 pub mod rays;
