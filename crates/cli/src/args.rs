@@ -16,6 +16,7 @@ use glam::DVec3;
 use crate::accuracy::AccuracyArgs;
 use crate::bench::BenchArgs;
 use crate::compare::CompareArgs;
+use crate::load::LoadArgs;
 use crate::query::QueryArgs;
 use crate::values::{self, AovList, Color, Explain, Hdri, Plane, Resolution, Switch};
 
@@ -69,7 +70,9 @@ Examples:
 const INSPECT_EXAMPLES: &str = "\
 Examples:
   firsthit inspect helmet.glb
-  firsthit inspect helmet.glb --json | jq .triangles";
+  firsthit inspect helmet.glb --json | jq .triangles
+  firsthit inspect helmet.glb --timing
+  firsthit inspect car.obj --only 'wheel*'";
 
 /// Renders models: one command from an OBJ, glTF or scene file to an image.
 #[derive(Debug, Parser)]
@@ -124,6 +127,8 @@ pub(crate) struct RenderArgs {
     pub(crate) camera: CameraArgs,
     #[command(flatten)]
     pub(crate) scene: SceneArgs,
+    #[command(flatten)]
+    pub(crate) load: LoadArgs,
     #[command(flatten)]
     pub(crate) animation: AnimationArgs,
     #[command(flatten)]
@@ -500,4 +505,12 @@ pub(crate) struct InspectArgs {
     /// Take every warning about the model as an error
     #[arg(long)]
     pub(crate) strict: bool,
+
+    /// Say how long each stage of loading took, and the whole compared to decoding its images alone; images that no ray
+    /// sees are left out
+    #[arg(long)]
+    pub(crate) timing: bool,
+
+    #[command(flatten)]
+    pub(crate) load: LoadArgs,
 }

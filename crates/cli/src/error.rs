@@ -60,8 +60,12 @@ impl From<ImportError> for Failure {
     fn from(error: ImportError) -> Self {
         let hint = match &error.kind {
             ErrorKind::Io(e) if e.kind() == std::io::ErrorKind::NotFound => Some("is the path right?"),
-            ErrorKind::Limit(_) => Some("a file this large is refused, in case it is hostile or broken"),
-            ErrorKind::Outside(_) => Some("copy that file into the model's folder and name it by a relative path"),
+            ErrorKind::Limit(_) => {
+                Some("refused in case it is hostile or broken; --limit-memory SIZE allows more of what files unpack to")
+            }
+            ErrorKind::Outside(_) => Some(
+                "copy that file into the model's folder and name it by a relative path, or trust the model: --allow-outside",
+            ),
             _ => None,
         };
         let failure = Self::failed(&error);
@@ -83,7 +87,8 @@ mod tests {
         assert_eq!(
             text,
             "error: a.gltf: /buffers/0/uri: refused to read '../b.bin': it lies outside the model's folder\n \
-             hint: copy that file into the model's folder and name it by a relative path"
+             hint: copy that file into the model's folder and name it by a relative path, or trust the model: \
+             --allow-outside"
         );
     }
 }

@@ -11,6 +11,7 @@ mod error;
 mod hdri;
 mod inspect;
 mod interrupt;
+mod load;
 mod measured;
 mod merge;
 mod progress;

@@ -249,7 +249,7 @@ impl Job<'_> {
         }
         let (scene, precision) = (&self.args.scene, self.args.quality.precision);
         Ok(format!(
-            "firsthit {}\n{}\n{options:?}\n{stage:?}\n{precision:?} {:?} {:?} {:?} {:?} {:?} {:?} {}",
+            "firsthit {}\n{}\n{options:?}\n{stage:?}\n{precision:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {}",
             env!("CARGO_PKG_VERSION"),
             files.join("\n"),
             scene.up,
@@ -257,6 +257,7 @@ impl Job<'_> {
             scene.scene,
             scene.points,
             scene.lines,
+            self.args.load.only,
             self.args.animation.play(),
             // Which of the files it is.
             self.hdri().and_then(Path::file_name).unwrap_or_default().to_string_lossy(),

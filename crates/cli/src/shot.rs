@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use firsthit_accel::{BuildOptions, Followed, Scene, SceneBuilder};
-use firsthit_import::{AnimationChoice, ImageCache, Imported, Options, Play, Report, SceneDesc, gltf};
+use firsthit_accel::{BuildError, BuildOptions, Followed, Scene, SceneBuilder};
+use firsthit_import::{AnimationChoice, Decode, ImageCache, Imported, Options, Play, Report, SceneDesc, gltf};
 use firsthit_render::framing::{self, Framing};
 use firsthit_render::{CameraChoice, Stage, StageOptions};
 
@@ -23,6 +23,8 @@ pub(crate) struct Shot {
     before: Option<(Stage, Scene)>,
     /// Those of the frame at hand.
     trees: Option<Scene>,
+    /// Those that were built while the images of the first frame were decoded.
+    built: Option<Result<Scene, BuildError>>,
 }
 
 /// At how many moments of an animation the camera is fitted to the model.
@@ -32,7 +34,7 @@ impl Shot {
     /// At the moment that the arguments ask for.
     pub(crate) fn new(args: &RenderArgs) -> Self {
         let play = args.animation.play();
-        Self { play, images: ImageCache::default(), framing: None, before: None, trees: None }
+        Self { play, images: ImageCache::default(), framing: None, before: None, trees: None, built: None }
     }
 
     /// Whether no frame was rendered yet.
@@ -40,9 +42,17 @@ impl Shot {
         self.before.is_none()
     }
 
-    /// Reads the model.
-    pub(crate) fn read(&self, args: &RenderArgs) -> Result<Imported, Failure> {
-        Ok(firsthit_import::open(&args.model, &self.options(args, self.play.clone()))?)
+    /// Reads the model. The trees of the first frame are built at the same time.
+    pub(crate) fn read(&mut self, args: &RenderArgs) -> Result<Imported, Failure> {
+        let options = self.options(args, self.play.clone());
+        if self.before.is_some() {
+            return Ok(firsthit_import::open(&args.model, &options)?);
+        }
+        let settings = build(args)?;
+        let trees = |scene: &SceneDesc| SceneBuilder::from_desc(scene, settings).build();
+        let (imported, trees) = firsthit_import::open_with(&args.model, &options, trees)?;
+        self.built = Some(trees);
+        Ok(imported)
     }
 
     fn options(&self, args: &RenderArgs, play: Option<Play>) -> Options {
@@ -55,8 +65,8 @@ impl Shot {
             play,
             strokes: gltf::Strokes { points: radius(scene.points), lines: radius(scene.lines) },
             images: self.play.is_some().then(|| self.images.clone()),
-            without_occlusion: true,
-            ..Default::default()
+            decode: Decode::Seen,
+            ..args.load.options()
         }
     }
 
@@ -79,7 +89,9 @@ impl Shot {
             for k in 0..FRAMED {
                 let time = seconds * f64::from(k) / f64::from(FRAMED - 1);
                 let play = Play { time, shutter: 0.0, ..play.clone() };
-                poses.push(firsthit_import::open(&args.model, &self.options(args, Some(play)))?.scene);
+                let options = Options { decode: Decode::Nothing, ..self.options(args, Some(play)) };
+                let pose = firsthit_import::open(&args.model, &options)?.scene;
+                poses.push(SceneDesc { images: scene.images.clone(), ..pose });
             }
             let all = framing::all_poses(poses);
             let trees = SceneBuilder::from_desc(&all, build(args)?).build().map_err(|e| at_model(args, &e))?;
@@ -107,8 +119,11 @@ impl Shot {
                 (trees, Some(followed))
             }
             None => {
-                let builder = SceneBuilder::from_desc(&scene, build(args)?);
-                (builder.build().map_err(|e| at_model(args, &e))?, None)
+                let built = match self.built.take() {
+                    Some(built) => built,
+                    None => SceneBuilder::from_desc(&scene, build(args)?).build(),
+                };
+                (built.map_err(|e| at_model(args, &e))?, None)
             }
         };
         self.trees = Some(trees.clone());

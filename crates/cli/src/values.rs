@@ -59,6 +59,27 @@ pub(crate) fn resolution(s: &str) -> Result<Resolution, String> {
     Ok(Resolution { width, height })
 }
 
+/// A number of bytes, by powers of 1000 (`MB`) or of 1024 (`MiB`, `M`).
+pub(crate) fn size(s: &str) -> Result<u64, String> {
+    let s = s.trim();
+    let end = s.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(s.len());
+    let (number, unit) = s.split_at(end);
+    let factor: f64 = match unit.trim().to_ascii_lowercase().as_str() {
+        "" | "b" => 1.0,
+        "kb" => 1e3,
+        "mb" => 1e6,
+        "gb" => 1e9,
+        "tb" => 1e12,
+        "k" | "kib" => 1024.0,
+        "m" | "mib" => 1024_f64.powi(2),
+        "g" | "gib" => 1024_f64.powi(3),
+        "t" | "tib" => 1024_f64.powi(4),
+        _ => return Err("expected a size as 500MB or 2GiB".into()),
+    };
+    let bytes = number.parse::<f64>().map_err(|_| "expected a size as 500MB or 2GiB")? * factor;
+    if bytes < 1.0 { Err("a size must be at least 1 byte".into()) } else { Ok(bytes as u64) }
+}
+
 pub(crate) fn crop(s: &str) -> Result<Crop, String> {
     let parts: Option<Vec<u32>> = s.split(',').map(whole).collect();
     match parts.as_deref() {
@@ -356,6 +377,16 @@ mod tests {
         }
         for s in ["", "1280", "1280x", "x720", "0x720", "1280x0", "-1x5", "1.5x2", "1x2x3", "99999999999x1"] {
             assert!(resolution(s).is_err(), "{s}");
+        }
+    }
+
+    #[test]
+    fn sizes_have_units() {
+        for (text, bytes) in [("1", 1), ("2kB", 2000), ("2 KiB", 2048), ("1.5GiB", 3 << 29), ("500MB", 500_000_000)] {
+            assert_eq!(size(text), Ok(bytes), "{text}");
+        }
+        for text in ["", "0", "-1", "GiB", "1x", "1.2.3", "nan"] {
+            assert!(size(text).is_err(), "{text}");
         }
     }
 

@@ -1,17 +1,26 @@
-//! Images that are decoded once for several readings of one file.
+//! What is kept for when a file is read again: its bytes, its JSON, its decoded images.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
+use crate::gltf::Document;
 use crate::scene::ImageDesc;
 use crate::{Limits, Report};
 
-/// Decoded images of files that are read again and again, as for the frames of an animation. Clones share them.
+/// Files that are read again and again, as for the frames of an animation: their bytes, their JSON and their decoded
+/// images (glTF's). Clones share them.
 ///
-/// Whoever changes a file or its images meanwhile sees the old images.
+/// Whoever changes a file or its images meanwhile sees the old ones.
 #[derive(Clone, Debug, Default)]
-pub struct ImageCache(Arc<Mutex<HashMap<PathBuf, Kept>>>);
+pub struct ImageCache(Arc<Mutex<Shelves>>);
+
+#[derive(Debug, Default)]
+struct Shelves {
+    images: HashMap<PathBuf, Kept>,
+    bytes: HashMap<PathBuf, Arc<Vec<u8>>>,
+    documents: HashMap<PathBuf, Arc<Document>>,
+}
 
 /// The images of a file, and what there was to say of them.
 #[derive(Clone, Debug)]
@@ -41,13 +50,41 @@ pub(crate) enum Shown {
 impl ImageCache {
     /// The images of a file, if the last reading of it had the same.
     pub(crate) fn get(&self, file: &Path, key: &Key) -> Option<Kept> {
-        self.0.lock().ok()?.get(file).filter(|kept| kept.key == *key).cloned()
+        self.0.lock().ok()?.images.get(file).filter(|kept| kept.key == *key).cloned()
     }
 
     pub(crate) fn keep(&self, file: &Path, kept: Kept) {
         // Poisoned by a thread that broke down: then nothing is kept.
         if let Ok(mut all) = self.0.lock() {
-            all.insert(file.to_owned(), kept);
+            all.images.insert(file.to_owned(), kept);
         }
+    }
+
+    /// The bytes of a file, read if they are not there yet.
+    pub(crate) fn bytes<E>(&self, file: &Path, read: impl FnOnce() -> Result<Vec<u8>, E>) -> Result<Arc<Vec<u8>>, E> {
+        if let Some(bytes) = self.0.lock().ok().and_then(|all| all.bytes.get(file).cloned()) {
+            return Ok(bytes);
+        }
+        let bytes = Arc::new(read()?);
+        if let Ok(mut all) = self.0.lock() {
+            all.bytes.insert(file.to_owned(), Arc::clone(&bytes));
+        }
+        Ok(bytes)
+    }
+
+    /// The JSON of a glTF file, parsed if it is not there yet.
+    pub(crate) fn document<E>(
+        &self,
+        file: &Path,
+        parse: impl FnOnce() -> Result<Document, E>,
+    ) -> Result<Arc<Document>, E> {
+        if let Some(document) = self.0.lock().ok().and_then(|all| all.documents.get(file).cloned()) {
+            return Ok(document);
+        }
+        let document = Arc::new(parse()?);
+        if let Ok(mut all) = self.0.lock() {
+            all.documents.insert(file.to_owned(), Arc::clone(&document));
+        }
+        Ok(document)
     }
 }

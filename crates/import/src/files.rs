@@ -18,6 +18,8 @@ pub(crate) struct Folder {
     base: PathBuf,
     /// `base`, canonical.
     real_base: PathBuf,
+    /// There is no fence.
+    open: bool,
 }
 
 impl Folder {
@@ -25,17 +27,17 @@ impl Folder {
     ///
     /// # Errors
     /// If there is no such folder.
-    pub(crate) fn of(file: &Path) -> Result<Self, ImportError> {
+    pub(crate) fn of(file: &Path, limits: &Limits) -> Result<Self, ImportError> {
         let base = parent(file);
         let root = base.canonicalize().map_err(|e| ImportError::io(file, e))?;
-        Ok(Self { real_base: root.clone(), root, base })
+        Ok(Self { real_base: root.clone(), root, base, open: limits.allow_outside })
     }
 
     /// The same fence, with references that start from beside `file` (one that was found through `self`).
     pub(crate) fn beside(&self, file: &Path) -> Self {
         let base = parent(file);
         let real_base = base.canonicalize().unwrap_or_else(|_| self.real_base.clone());
-        Self { root: self.root.clone(), base, real_base }
+        Self { root: self.root.clone(), base, real_base, open: self.open }
     }
 
     /// Finds the file of a plain relative path.
@@ -44,6 +46,16 @@ impl Folder {
     /// [`ErrorKind::Outside`], or [`ErrorKind::Io`] if there is no such file.
     pub(crate) fn find(&self, reference: &str) -> Result<PathBuf, ErrorKind> {
         let outside = || ErrorKind::Outside(reference.to_owned());
+        if self.open {
+            let path = reference.strip_prefix("file://").unwrap_or(reference);
+            // Nothing is fetched from anywhere.
+            if has_scheme(path) && !cfg!(windows) {
+                return Err(outside());
+            }
+            let path = self.base.join(path);
+            path.canonicalize()?;
+            return Ok(path);
+        }
         let relative = Path::new(reference);
         let absolute = |c| matches!(c, Component::Prefix(_) | Component::RootDir);
         if has_scheme(reference) || relative.components().any(absolute) {
@@ -97,7 +109,7 @@ impl Folder {
                 continue;
             }
             // Nothing outside is listed, whatever dots led here.
-            if !without_dots(&self.real_base.join(&actual)).starts_with(&self.root) {
+            if !self.open && !without_dots(&self.real_base.join(&actual)).starts_with(&self.root) {
                 return None;
             }
             let wanted = part.to_str()?.to_lowercase();
@@ -145,14 +157,15 @@ impl<'a> Input<'a> {
             let cause = if meta.is_dir() { "is a folder" } else { "is not a regular file" };
             return Err(io(io::Error::new(io::ErrorKind::InvalidInput, cause)));
         }
-        if meta.len() > limits.file_bytes {
-            return Err(too_large(path, limits.file_bytes, false));
+        let most = limits.file_bytes.min(limits.memory.unwrap_or(u64::MAX));
+        if meta.len() > most {
+            return Err(too_large(path, most, false));
         }
         let file = File::open(path).map_err(io)?;
         // A small file that becomes a huge one is no model.
         let limit = limits.decompressed(meta.len());
         let (reader, limit, length): (Box<dyn Read>, _, _) = match compression(path) {
-            Compression::None => (Box::new(file), limits.file_bytes, meta.len()),
+            Compression::None => (Box::new(file), most, meta.len()),
             Compression::Gzip => (Box::new(flate2::bufread::MultiGzDecoder::new(BufReader::new(file))), limit, 0),
             Compression::Zstandard => {
                 let decoder = ruzstd::decoding::StreamingDecoder::new(BufReader::new(file))
@@ -310,7 +323,7 @@ mod tests {
         fs::write(at("model/Textures/Wood one.PNG"), "wood").expect("file");
         fs::write(at("model/50%25.png"), "").expect("file");
         fs::write(at("secret.txt"), "secret").expect("file");
-        let folder = Folder::of(&at("model/a.obj")).expect("folder");
+        let folder = Folder::of(&at("model/a.obj"), &Limits::default()).expect("folder");
         (dir, folder)
     }
 
@@ -354,6 +367,22 @@ mod tests {
         assert!(matches!(f.find_uri("..%2Fsecret.txt"), Err(ErrorKind::Outside(_))));
         assert!(matches!(f.find("nothing.txt"), Err(ErrorKind::Io(_))));
         assert!(matches!(f.find("nul\0.txt"), Err(ErrorKind::Io(_))));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn without_a_fence_files_outside_are_found() {
+        let (dir, _) = model();
+        let at = |p: &str| dir.path().join(p);
+        std::os::unix::fs::symlink(at("secret.txt"), at("model/out.txt")).expect("link");
+        let limits = Limits { allow_outside: true, ..Limits::default() };
+        let f = Folder::of(&at("model/a.obj"), &limits).expect("folder");
+        let absolute = at("secret.txt").to_str().expect("UTF-8").to_owned();
+        for name in ["../secret.txt", "out.txt", &absolute, &format!("file://{absolute}"), r"..\SECRET.txt"] {
+            assert!(f.find_loosely(name).is_ok(), "{name}");
+        }
+        assert!(f.find_uri("%2e%2e/secret.txt").is_ok());
+        assert!(matches!(f.find_uri("http://example.org/a.png"), Err(ErrorKind::Outside(_))));
     }
 
     #[cfg(unix)]

@@ -13,7 +13,8 @@ use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 use rayon::prelude::*;
 
 use crate::scene::{ImageDesc, Pixels};
-use crate::{ErrorKind, ImportError, Limits, files, ktx2};
+use crate::timing::{Stage, timed};
+use crate::{ErrorKind, ImportError, Limits, Stages, files, ktx2};
 
 /// An image that is still encoded.
 #[derive(Clone, Copy, Debug)]
@@ -59,6 +60,10 @@ pub fn decode(bytes: &[u8], name: &str, limits: &Limits) -> Result<ImageDesc, Er
 /// [`Limits::image_bytes`] counts for all of them together: an image that no longer fits is [`ErrorKind::Limit`].
 #[must_use]
 pub fn decode_all(sources: &[Encoded<'_>], limits: &Limits) -> Vec<Result<ImageDesc, ErrorKind>> {
+    decode_each(sources, limits, None)
+}
+
+fn decode_each(sources: &[Encoded<'_>], limits: &Limits, stages: Option<&Stages>) -> Vec<Result<ImageDesc, ErrorKind>> {
     let mut left = limits.image_bytes;
     let fits: Vec<Result<(), ErrorKind>> = sources
         .iter()
@@ -69,7 +74,34 @@ pub fn decode_all(sources: &[Encoded<'_>], limits: &Limits) -> Vec<Result<ImageD
             Ok(())
         })
         .collect();
-    sources.par_iter().zip(fits).map(|(s, fits)| fits.and_then(|()| decode(s.bytes, s.name, limits))).collect()
+    let one = |(s, fits): (&Encoded<'_>, Result<(), ErrorKind>)| {
+        fits.and_then(|()| timed(stages, Stage::ImagesInAll, || decode(s.bytes, s.name, limits)))
+    };
+    // One by one, for a few large images are to be shared out evenly.
+    sources.par_iter().zip(fits).with_max_len(1).map(one).collect()
+}
+
+/// As [`decode_all`], with a look at the clock.
+pub(crate) fn decode_timed(
+    sources: &[Encoded<'_>],
+    limits: &Limits,
+    stages: Option<&Stages>,
+) -> Vec<Result<ImageDesc, ErrorKind>> {
+    if let Some(stages) = stages {
+        stages.keep(sources);
+    }
+    timed(stages, Stage::Images, || decode_each(sources, limits, stages))
+}
+
+/// Checks the images of a file against what the limits allow to be made of their bytes and of `more`.
+///
+/// # Errors
+/// If all together take too much memory. What cannot be decoded takes none.
+pub(crate) fn check_memory(sources: &[Encoded<'_>], limits: &Limits, more: u64) -> Result<(), ErrorKind> {
+    let read = sources.iter().fold(more, |sum, s| sum.saturating_add(s.bytes.len() as u64));
+    let sizes = sources.iter().filter_map(|s| Size::of(s.bytes, limits).ok());
+    let held = sizes.fold(0_u64, |sum, size| sum.saturating_add(size.bytes()));
+    limits.check_memory("its images", held, read)
 }
 
 /// How wide and high an image is, from its header alone.

@@ -24,6 +24,7 @@ pub mod image;
 mod ktx2;
 mod limits;
 pub mod obj;
+mod only;
 mod open;
 mod place;
 mod plain;
@@ -36,13 +37,15 @@ pub mod srgb;
 pub mod stl;
 #[cfg(test)]
 mod tests;
+mod timing;
 pub mod toml;
 mod unit;
 
 pub use cache::ImageCache;
 pub use error::{ErrorKind, ImportError};
 pub use limits::Limits;
-pub use open::{Imported, NotAnAxis, Options, UpAxis, open};
+pub use open::{Decode, Imported, NotAnAxis, Options, UpAxis, open, open_with};
 pub use play::{AnimationChoice, AnimationInfo, Play};
 pub use report::{ExtensionUse, Report, Support, Warning};
 pub use scene::SceneDesc;
+pub use timing::{Stage, Stages};

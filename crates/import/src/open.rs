@@ -4,15 +4,17 @@ use std::fs::{self, File};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::sync::Arc;
 
 use glam::{DAffine3, DMat3, DVec3};
 
 use crate::files::Input;
 use crate::scene::SurfaceDesc;
+use crate::timing::{Stage, timed};
 use crate::toml::Inclusion;
 use crate::{
-    AnimationChoice, ErrorKind, ImageCache, ImportError, Limits, Play, Report, SceneDesc, files, gltf, obj, ply, stl,
-    toml,
+    AnimationChoice, ErrorKind, ImageCache, ImportError, Limits, Play, Report, SceneDesc, Stages, files, gltf, obj,
+    ply, stl, toml,
 };
 
 /// Which axis of the file points up.
@@ -85,13 +87,32 @@ pub struct Options {
     pub play: Option<Play>,
     /// How thick points and lines are drawn (glTF's; OBJ has none that are read).
     pub strokes: gltf::Strokes,
-    /// Keeps decoded images (glTF's) for when the file is read again.
+    /// Keeps the bytes of files but for OBJ, and of glTF files the JSON and the decoded images, for when they are read
+    /// again.
     pub images: Option<ImageCache>,
-    /// Leave the images out that nothing but occlusion textures show, which a ray tracer has no use for: a white pixel
-    /// stands for each (glTF alone).
-    pub without_occlusion: bool,
+    /// Which images are decoded.
+    pub decode: Decode,
+    /// Only the parts of these names, in which `*` stands for any characters: objects and groups (OBJ), solids (STL),
+    /// nodes with all below them and meshes (glTF), objects (scene files). Empty: everything. Materials, cameras, lights
+    /// and places stay as they are; indices count what is kept.
+    pub only: Vec<String>,
+    /// Measures where the time goes.
+    pub stages: Option<Stages>,
     /// Limits against hostile files.
     pub limits: Limits,
+}
+
+/// Which images of a file are decoded; a white pixel stands for each of the others.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Decode {
+    /// All that materials name.
+    #[default]
+    All,
+    /// Those that rays can see: not those of occlusion textures (a ray tracer has no use for them), nor of materials that
+    /// nothing which is shown has.
+    Seen,
+    /// None: for questions about shapes.
+    Nothing,
 }
 
 /// A file's content.
@@ -126,37 +147,69 @@ pub struct Imported {
 /// # Errors
 /// [`ImportError`] says which file, where in it and why.
 pub fn open(path: impl AsRef<Path>, options: &Options) -> Result<Imported, ImportError> {
+    open_with(path, options, |_| ()).map(|(imported, ())| imported)
+}
+
+/// As [`open`], with something to do as soon as all shapes are there and while images are still being decoded, such as
+/// building trees. The scene that it gets is whole but for its images.
+///
+/// # Errors
+/// As for [`open`].
+pub fn open_with<T: Send>(
+    path: impl AsRef<Path>,
+    options: &Options,
+    meanwhile: impl FnOnce(&SceneDesc) -> T + Send,
+) -> Result<(Imported, T), ImportError> {
     let path = path.as_ref();
     let file = if path.is_dir() { only_model(path)? } else { path.to_owned() };
     let format = Format::of(&file)?;
-    let mut imported = read_as(format, &file, options, &Inclusion::default())?;
-    if let Some(play) = options.play.as_ref().filter(|play| play.shutter > 0.0) {
-        let play = Play { time: play.time + play.shutter, shutter: 0.0, ..play.clone() };
-        let options = Options { play: Some(play), ..options.clone() };
-        let later = read_as(format, &file, &options, &Inclusion::default())?;
-        if let Some(message) = imported.scene.move_to(&later.scene) {
-            imported.report.warn(&file, "", message);
+    let (mut meanwhile, mut result) = (Some(meanwhile), None);
+    let mut then = |scene: &mut SceneDesc, report: &mut Report| {
+        if let Some(play) = options.play.as_ref().filter(|play| play.shutter > 0.0) {
+            let play = Play { time: play.time + play.shutter, shutter: 0.0, ..play.clone() };
+            let options = Options { play: Some(play), decode: Decode::Nothing, ..options.clone() };
+            let later = read_as(format, &file, &options, &Inclusion::default(), &mut |_, _| Ok(()))?;
+            if let Some(message) = scene.move_to(&later.scene) {
+                report.warn(&file, "", message);
+            }
         }
+        if let Some(up) = options.up {
+            scene.transform(up.to_y());
+        }
+        finish(scene, report, &file, options)?;
+        result = meanwhile.take().map(|work| work(scene));
+        Ok(())
+    };
+    let imported = read_as(format, &file, options, &Inclusion::default(), &mut then)?;
+    let done = result.or_else(|| meanwhile.take().map(|work| work(&imported.scene)));
+    match done {
+        Some(done) => Ok((imported, done)),
+        None => Err(ImportError::unsupported(path, "", "nothing was read")),
     }
-    if let Some(up) = options.up {
-        imported.scene.transform(up.to_y());
-    }
-    imported.finished(&file, options)
 }
 
-impl Imported {
-    /// The last checks of a whole scene: for transforms, which may have been sound until they were multiplied, and for
-    /// something to see.
-    pub(crate) fn finished(mut self, file: &Path, options: &Options) -> Result<Self, ImportError> {
-        let Self { scene, report } = &mut self;
-        let warn = |_, name: &str, message| report.warn(file, format!("instance '{name}'"), message);
-        scene.bake(&options.limits, warn).map_err(|kind| ImportError::new(file, "", kind))?;
-        let mut surfaces = scene.instances.iter().flat_map(|i| &scene.meshes[i.mesh].geometries).map(|g| &g.surface);
-        if !surfaces.any(|s| !matches!(s, SurfaceDesc::Triangles(mesh) if mesh.triangles.is_empty())) {
-            report.warn(file, "", "has no surface: there is nothing to see");
-        }
-        Ok(self)
+/// What is done with a scene as soon as its shapes are there, perhaps before its images are.
+pub(crate) type Then<'a> = dyn FnMut(&mut SceneDesc, &mut Report) -> Result<(), ImportError> + Send + 'a;
+
+/// The last checks of a whole scene: for transforms, which may have been sound until they were multiplied, for memory,
+/// and for something to see.
+pub(crate) fn finish(
+    scene: &mut SceneDesc,
+    report: &mut Report,
+    file: &Path,
+    options: &Options,
+) -> Result<(), ImportError> {
+    let warn = |_, name: &str, message| report.warn(file, format!("instance '{name}'"), message);
+    scene.bake(&options.limits, warn).map_err(|kind| ImportError::new(file, "", kind))?;
+    // As far as they are files; bytes at hand may become what any file may.
+    let read = report.files.iter().filter_map(|file| fs::metadata(file).ok()).map(|meta| meta.len()).sum();
+    let memory = options.limits.check_memory("its meshes and images", scene.bytes(), read);
+    memory.map_err(|kind| ImportError::new(file, "", kind))?;
+    let mut surfaces = scene.instances.iter().flat_map(|i| &scene.meshes[i.mesh].geometries).map(|g| &g.surface);
+    if !surfaces.any(|s| !matches!(s, SurfaceDesc::Triangles(mesh) if mesh.triangles.is_empty())) {
+        report.warn(file, "", "has no surface: there is nothing to see");
     }
+    Ok(())
 }
 
 /// The formats that are read.
@@ -210,29 +263,39 @@ pub(crate) fn read_as(
     file: &Path,
     options: &Options,
     including: &Inclusion,
+    then: &mut Then<'_>,
 ) -> Result<Imported, ImportError> {
+    let stages = options.stages.as_ref();
     let mut input = Input::open(file, &options.limits)?;
-    // The only format that is not held as a whole: its files are long, and read from front to end.
-    if format == Format::Obj && !ply::is_ply(input.start(4)?) {
+    let mut imported = if format == Format::Obj && !ply::is_ply(input.start(4)?) {
+        // The only format that is not held as a whole: its files are long, and read from front to end.
         check_choices(format, file, options)?;
-        return obj::read_input(input, file, options);
-    }
-    let bytes = input.rest()?;
-    let is_gltf = format == Format::Gltf || (format == Format::Json && is_gltf_json(&bytes));
-    if !is_gltf {
+        obj::read_input(input, file, options)?
+    } else {
+        let read = || timed(stages, Stage::Read, || input.rest());
+        let bytes = match &options.images {
+            Some(cache) => cache.bytes(file, read)?,
+            None => Arc::new(read()?),
+        };
+        if format == Format::Gltf || (format == Format::Json && is_gltf_json(&bytes)) {
+            return gltf::read_bytes(&bytes, file, options, then);
+        }
         check_choices(format, file, options)?;
-    }
-    match format {
-        // Whatever it is called.
-        Format::Obj | Format::Stl if ply::is_ply(&bytes) => ply::read_bytes(&bytes, file, options),
-        Format::Obj => obj::read_bytes(bytes, file, options),
-        Format::Ply if stl::is_ascii(&bytes) => stl::read_bytes(&bytes, file, options),
-        Format::Ply => ply::read_bytes(&bytes, file, options),
-        Format::Stl => stl::read_bytes(&bytes, file, options),
-        Format::Gltf => gltf::read_bytes(&bytes, file, options),
-        Format::Json if is_gltf => gltf::read_bytes(&bytes, file, options),
-        Format::Toml | Format::Json => toml::read_bytes(&bytes, file, options, including),
-    }
+        let mut imported = match format {
+            // Whatever it is called.
+            Format::Obj | Format::Stl if ply::is_ply(&bytes) => ply::read_bytes(&bytes, file, options),
+            Format::Ply if stl::is_ascii(&bytes) => stl::read_bytes(&bytes, file, options),
+            Format::Ply => timed(stages, Stage::Parse, || ply::read_bytes(&bytes, file, options)),
+            Format::Toml | Format::Json => toml::read_bytes(&bytes, file, options, including),
+            Format::Stl | Format::Obj | Format::Gltf => {
+                timed(stages, Stage::Parse, || stl::read_bytes(&bytes, file, options))
+            }
+        }?;
+        imported.scene.keep_only(&options.only, file)?;
+        imported
+    };
+    then(&mut imported.scene, &mut imported.report)?;
+    Ok(imported)
 }
 
 /// What only glTF files have is not asked of other ones; scene files pass it on to the models in them.

@@ -402,6 +402,32 @@ pub enum Projection {
     },
 }
 
+impl SceneDesc {
+    /// About how many bytes it holds in memory: meshes, images, instances.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        let surfaces = self.meshes.iter().flat_map(|m| &m.geometries).map(|g| &g.surface);
+        let meshes: u64 = surfaces.map(|s| if let SurfaceDesc::Triangles(mesh) = s { mesh.bytes() } else { 0 }).sum();
+        let images: u64 = self.images.iter().map(|i| i.pixels.bytes()).sum();
+        let names: usize = self.instances.iter().map(|i| i.name.len()).sum();
+        meshes + images + (size_of_val(self.instances.as_slice()) + names) as u64
+    }
+}
+
+impl TriangleMesh {
+    /// How many bytes it holds in memory.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        let uvs: usize = self.uvs.iter().map(|set| size_of_val(set.as_slice())).sum();
+        let rest = size_of_val(self.positions.as_slice())
+            + size_of_val(self.triangles.as_slice())
+            + size_of_val(self.normals.as_slice())
+            + size_of_val(self.tangents.as_slice())
+            + size_of_val(self.colors.as_slice());
+        (uvs + rest) as u64
+    }
+}
+
 impl Default for MaterialDesc {
     /// glTF's default material.
     fn default() -> Self {

@@ -1,5 +1,7 @@
 //! What all formats have in common.
 
+mod loading;
+
 use std::fs;
 use std::path::Path;
 

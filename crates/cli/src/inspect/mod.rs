@@ -8,7 +8,7 @@ use std::time::Instant;
 use firsthit_accel::{BuildOptions, Scene, SceneBuilder};
 use firsthit_geometry::mesh::MeshReport;
 use firsthit_import::scene::{AlphaMode, LightKind, MaterialModel, MeshDesc, PbrMaterial, Projection, SurfaceDesc};
-use firsthit_import::{Imported, Report, SceneDesc};
+use firsthit_import::{Decode, Imported, Options, Report, SceneDesc, Stage as LoadStage, Stages};
 use firsthit_render::{EffectPlan, Stage, StageOptions};
 use serde::Serialize;
 
@@ -21,22 +21,29 @@ use crate::simd;
 /// Looks at a model and prints what is in it.
 pub(crate) fn run(args: &InspectArgs) -> Result<(), Failure> {
     let started = Instant::now();
-    let options = firsthit_import::Options { up: args.up, ..Default::default() };
-    let Imported { scene, report } = firsthit_import::open(&args.model, &options)?;
+    let stages = args.timing.then(Stages::default);
+    let decode = if args.timing { Decode::Seen } else { Decode::All };
+    let options = Options { up: args.up, decode, stages: stages.clone(), ..args.load.options() };
+    let settings = BuildOptions { precision: args.precision, simd: simd::level()?, ..Default::default() };
+    let build = |scene: &SceneDesc| {
+        let started = Instant::now();
+        let trees = SceneBuilder::from_desc(scene, settings).build();
+        (trees, started.elapsed().as_secs_f64())
+    };
+    let (Imported { scene, report }, (trees, build)) = firsthit_import::open_with(&args.model, &options, build)?;
     // Warnings are part of the result; here they only decide whether there is one.
     Console::Quiet.warnings(&report, args.strict)?;
-    let load = started.elapsed().as_secs_f64();
-
-    let started = Instant::now();
-    let options = BuildOptions { precision: args.precision, simd: simd::level()?, ..Default::default() };
-    let trees = SceneBuilder::from_desc(&scene, options).build().map_err(|e| at_model(args, &e))?;
-    let build = started.elapsed().as_secs_f64();
+    let trees = trees.map_err(|e| at_model(args, &e))?;
+    let whole = started.elapsed().as_secs_f64();
+    let load = whole - build;
+    let timing = stages.map(|stages| Timing::new(&stages, build, whole));
 
     let scene = Arc::new(scene);
     let stage = Stage::new(scene.clone(), trees.clone(), &StageOptions::default()).map_err(|e| at_model(args, &e))?;
     let model = args.model.display().to_string();
     let seconds = Seconds { load, build };
     let inspection = Inspection::new(model, &scene, &report, &trees, stage.plan(), stage.explain(), seconds);
+    let inspection = Inspection { timing, ..inspection };
     if args.json { print_json(&inspection) } else { print(inspection.to_string().as_bytes()) }
 }
 
@@ -87,6 +94,8 @@ struct Inspection<'a> {
     /// Warnings beyond those listed.
     more_warnings: u64,
     seconds: Seconds,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    timing: Option<Timing>,
 }
 
 #[derive(Serialize)]
@@ -167,8 +176,52 @@ struct Bvh {
 
 #[derive(Serialize)]
 struct Seconds {
+    /// The whole without the trees.
     load: f64,
     build: f64,
+}
+
+/// Seconds of each stage. They overlap: images are decoded while meshes are read and trees are built.
+#[derive(Serialize)]
+struct Timing {
+    /// Bytes from the disk, decompressed.
+    read: f64,
+    parse: f64,
+    meshes: f64,
+    /// How many were decoded.
+    images_decoded: usize,
+    /// From the first to the last of them.
+    images: f64,
+    /// Summed over threads.
+    images_in_all: f64,
+    trees: f64,
+    whole: f64,
+    /// Decoding the images once more and nothing else, from the first to the last.
+    images_alone: f64,
+    /// `whole` over `images_alone`; absent without images.
+    ratio: Option<f64>,
+    threads: usize,
+}
+
+impl Timing {
+    fn new(stages: &Stages, trees: f64, whole: f64) -> Self {
+        let seconds = |stage| stages.get(stage).as_secs_f64();
+        let images_alone = stages.decode_again().as_secs_f64();
+        let images_decoded = stages.images();
+        Self {
+            read: seconds(LoadStage::Read),
+            parse: seconds(LoadStage::Parse),
+            meshes: seconds(LoadStage::Meshes),
+            images_decoded,
+            images: seconds(LoadStage::Images),
+            images_in_all: seconds(LoadStage::ImagesInAll),
+            trees,
+            whole,
+            images_alone,
+            ratio: (images_decoded > 0).then(|| whole / images_alone),
+            threads: rayon::current_num_threads(),
+        }
+    }
 }
 
 impl<'a> Inspection<'a> {
@@ -232,6 +285,7 @@ impl<'a> Inspection<'a> {
             warnings: warnings(report),
             more_warnings: report.more_warnings,
             seconds,
+            timing: None,
             mesh_list,
         }
     }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{Bounds, Inspection, Mesh};
+use super::{Bounds, Inspection, Mesh, Timing};
 use crate::console::{count, grouped, visible};
 
 /// Entries of each list that are printed; JSON has all.
@@ -75,7 +75,30 @@ impl fmt::Display for Inspection<'_> {
         for warning in self.warnings.iter().take(SHOWN) {
             writeln!(f, "    {}", visible(warning))?;
         }
-        more(f, self.warnings.len() as u64 + self.more_warnings)
+        more(f, self.warnings.len() as u64 + self.more_warnings)?;
+        self.timing.as_ref().map_or(Ok(()), |timing| timing.fmt(f))
+    }
+}
+
+impl fmt::Display for Timing {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let images = count(self.images_decoded as u64, "image");
+        let threads = count(self.threads as u64, "thread");
+        writeln!(f, "  {:11} stages overlap, on {threads}", "timing")?;
+        for (stage, seconds) in [("read", self.read), ("parse", self.parse), ("meshes", self.meshes)] {
+            writeln!(f, "    {stage:12}  {:8.2} ms", 1e3 * seconds)?;
+        }
+        let sum = 1e3 * self.images_in_all;
+        writeln!(f, "    {:12}  {:8.2} ms: {images}, {sum:.2} ms in all threads", "images", 1e3 * self.images)?;
+        writeln!(f, "    {:12}  {:8.2} ms", "trees", 1e3 * self.trees)?;
+        writeln!(f, "    {:12}  {:8.2} ms", "whole", 1e3 * self.whole)?;
+        match self.ratio {
+            Some(ratio) => {
+                let alone = 1e3 * self.images_alone;
+                writeln!(f, "    {:12}  {alone:8.2} ms; the whole is {ratio:.2} times that", "images alone")
+            }
+            None => Ok(()),
+        }
     }
 }
 

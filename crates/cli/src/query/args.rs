@@ -9,6 +9,7 @@ use firsthit_import::UpAxis;
 
 use super::table::Format;
 use crate::args::ViewArgs;
+use crate::load::LoadArgs;
 use crate::values::{self, Resolution};
 
 const EXAMPLES: &str = "\
@@ -193,6 +194,9 @@ pub(crate) struct QueryArgs {
     /// Of `visible`: width and height of the picture in pixels [default: 1280x720]
     #[arg(long, value_name = "WxH", value_parser = values::resolution)]
     pub(crate) resolution: Option<Resolution>,
+
+    #[command(flatten)]
+    pub(crate) load: LoadArgs,
 
     #[command(flatten)]
     pub(crate) view: ViewArgs,

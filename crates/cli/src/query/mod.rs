@@ -13,7 +13,7 @@ use std::time::Instant;
 
 use firsthit_accel::{BuildOptions, ClosestPoint, Crossings, Hit, HitId, Scene, SceneBuilder, Solid};
 use firsthit_geometry::Ray;
-use firsthit_import::{Imported, SceneDesc};
+use firsthit_import::{Decode, Imported, Options, SceneDesc};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -101,7 +101,7 @@ fn check(args: &QueryArgs) -> Result<(), Failure> {
 
 /// Reads the model, sparing the files that are read, and builds its trees.
 fn open_model(args: &QueryArgs, place: &Place, rows: Option<&Path>) -> Result<(SceneDesc, Scene), Failure> {
-    let options = firsthit_import::Options { up: args.up, without_occlusion: true, ..Default::default() };
+    let options = Options { up: args.up, decode: Decode::Nothing, ..args.load.options() };
     let Imported { scene, report } = firsthit_import::open(&args.model, &options)?;
     Console::new(args.quiet, false).warnings(&report, args.strict)?;
     place.spare(report.files.iter().map(PathBuf::as_path).chain(rows))?;

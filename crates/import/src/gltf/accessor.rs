@@ -1,7 +1,7 @@
 //! Accessors: typed arrays in buffers, of any component type, normalised, strided, sparse
 //! (glTF 2.0 specification, sections 3.6.2 and 3.11).
 
-use std::cell::Cell;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use gltf::json::accessor::{ComponentType, Type};
 use gltf::json::validation::Checked;
@@ -66,14 +66,14 @@ struct Sparse<'a> {
 const MOST_ZEROS: u64 = 1 << 24;
 
 /// Most bytes of zeros that all accessors together may be read as.
-const MOST_ZERO_BYTES: u64 = 1 << 30;
+const MOST_ZERO_BYTES: u64 = 1 << 28;
 
 /// What may still be read of accessors that have no data.
-pub(super) struct ZeroBudget(Cell<u64>);
+pub(super) struct ZeroBudget(AtomicU64);
 
 impl ZeroBudget {
     pub(super) fn new(limits: &Limits) -> Self {
-        Self(Cell::new(limits.file_bytes.min(MOST_ZERO_BYTES)))
+        Self(AtomicU64::new(limits.file_bytes.min(limits.memory.unwrap_or(MOST_ZERO_BYTES))))
     }
 }
 
@@ -175,11 +175,11 @@ impl<'a> Accessor<'a> {
         if data.is_none() {
             check_count(source, index, MOST_ZEROS)?;
             let bytes = count.saturating_mul(element_size(kind, ComponentType::F32).1);
-            let Some(left) = source.zeros.0.get().checked_sub(bytes) else {
+            let Some(left) = source.zeros.0.load(Relaxed).checked_sub(bytes) else {
                 let cause = "accessors without data are read so often that their zeros would take too much memory";
                 return Err(source.at(format!("/accessors/{}", index.value()), ErrorKind::Limit(cause.into())));
             };
-            source.zeros.0.set(left);
+            source.zeros.0.store(left, Relaxed);
         }
         let data = data.map(|d| d.data(source)).transpose()?;
         let sparse = sparse.map(|s| Sparse::new(source, &s, count)).transpose()?;
@@ -312,15 +312,16 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::Report;
+    use crate::{Options, Report};
 
     /// Reads accessor 0 of a file whose only buffer is `bin`.
     fn with<T>(json: &str, bin: &[u8], f: impl FnOnce(Accessor<'_>) -> T) -> Result<T, String> {
-        let (limits, file) = (Limits::default(), Path::new("a.gltf"));
+        let (options, file) = (Options::default(), Path::new("a.gltf"));
         let text =
             format!(r#"{{"asset": {{"version": "2.0"}}, "buffers": [{{"byteLength": {}}}], {json}}}"#, bin.len());
         let root = Root::from_str(&text).map_err(|e| e.to_string())?;
-        let source = Source::new(file, &root, Some(bin), &limits, &mut Report::default()).map_err(|e| e.to_string())?;
+        let source =
+            Source::new(file, &root, Some(bin), &options, &mut Report::default()).map_err(|e| e.to_string())?;
         Accessor::new(&source, Index::new(0)).map(f).map_err(|e| e.to_string())
     }
 

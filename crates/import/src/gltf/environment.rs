@@ -40,6 +40,12 @@ fn one() -> f32 {
     1.0
 }
 
+/// Whether a scene of the file has a map around it.
+pub(super) fn is_there(source: &Source<'_>, scene: Option<usize>) -> bool {
+    let others = scene.and_then(|s| source.root.scenes[s].extensions.as_ref()).map(|e| &e.others);
+    others.is_some_and(|others| others.contains_key(NAME))
+}
+
 /// The map around a scene of the file, and its image, which is to stand after the others; `None` if the scene has no
 /// such light or, with a warning, if its images cannot be read.
 ///

@@ -39,7 +39,7 @@ pub(super) fn place(
     report: &mut Report,
 ) -> Result<(), ImportError> {
     let mut shown_by: BTreeMap<usize, Vec<(usize, Placement)>> = BTreeMap::new();
-    for &node in &nodes.shown {
+    for &node in &nodes.drawn {
         if let Some(mesh) = source.root.nodes[node].mesh {
             shown_by.entry(mesh.value()).or_default().push((node, placement(source, node)));
         }
@@ -74,7 +74,7 @@ pub(super) fn place(
     // The node of each instance.
     let mut drawn: Vec<usize> = Vec::new();
     let mut weight = 0_u64;
-    for &node in &nodes.shown {
+    for &node in &nodes.drawn {
         let Some(&(mesh, transform)) = placed.get(&node) else { continue };
         let name = source.root.nodes[node].name.clone().unwrap_or_else(|| format!("node {node}"));
         let instance = |transform| InstanceDesc { name: name.clone(), mesh, transform, moves_to: None };

@@ -11,7 +11,8 @@ use serde_path_to_error::Segment;
 use crate::ImportError;
 
 /// A file's JSON.
-pub(super) struct Document {
+#[derive(Debug)]
+pub(crate) struct Document {
     /// The typed model, without animations: in one that is not played nothing can be wrong.
     pub(super) root: Root,
     /// The tree of values, which keeps numbers in f64.

@@ -12,7 +12,7 @@ use super::texture::{Info, Textures};
 use crate::scene::{AlphaMode, Channel, MaterialDesc, MaterialModel, PbrMaterial, TextureRef};
 use crate::{ImportError, Report};
 
-/// Reads all materials, with the images of occlusion textures or without.
+/// Reads all materials, with the images of those that are `seen`, and of occlusion textures or without.
 ///
 /// # Errors
 /// If one refers to a texture that does not exist.
@@ -21,6 +21,7 @@ pub(super) fn read<'a>(
     textures: &mut Textures<'a>,
     report: &mut Report,
     occlusion: bool,
+    seen: &[bool],
 ) -> Result<Vec<MaterialDesc>, ImportError> {
     let materials = source.root.materials.iter().enumerate();
     materials
@@ -30,6 +31,7 @@ pub(super) fn read<'a>(
                 textures: &mut *textures,
                 report: &mut *report,
                 occlusion,
+                seen: seen[i],
                 place: format!("/materials/{i}"),
             };
             let model = MaterialModel::Pbr(Box::new(reader.material(json)?));
@@ -57,6 +59,8 @@ pub(super) struct Reader<'a, 'b> {
     report: &'a mut Report,
     /// Occlusion textures are to be decoded.
     occlusion: bool,
+    /// So are all of its textures.
+    seen: bool,
     pub(super) place: String,
 }
 
@@ -186,7 +190,7 @@ impl Reader<'_, '_> {
     }
 
     pub(super) fn info(&mut self, key: &str, info: Info<'_>, channel: Channel) -> Result<TextureRef, ImportError> {
-        let wanted = key != "occlusionTexture" || self.occlusion;
+        let wanted = self.seen && (key != "occlusionTexture" || self.occlusion);
         self.textures.reference(info, channel, wanted, &format!("{}/{key}", self.place))
     }
 

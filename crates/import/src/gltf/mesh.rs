@@ -47,6 +47,8 @@ pub(super) struct MeshReader<'a> {
     read: u64,
     vertices: u64,
     triangles: u64,
+    /// What the meshes take in memory.
+    bytes: u64,
 }
 
 fn makes_triangles(mode: Mode) -> bool {
@@ -72,7 +74,7 @@ impl<'a> MeshReader<'a> {
     ) -> Result<Self, ImportError> {
         let quantized = source.uses("KHR_mesh_quantization");
         let draco = DracoPrimitives::new(source)?;
-        Ok(Self { source, value, strokes, quantized, draco, variant, read: 0, vertices: 0, triangles: 0 })
+        Ok(Self { source, value, strokes, quantized, draco, variant, read: 0, vertices: 0, triangles: 0, bytes: 0 })
     }
 
     /// Warns, once for a file, of primitives of points and lines that are not drawn.
@@ -137,6 +139,7 @@ impl<'a> MeshReader<'a> {
             report.warn(source.file, place, "has no POSITION: nothing to draw");
             return Ok(None);
         };
+        self.check_memory(positions, json.indices, &place)?;
         let quantized = self.quantized;
         let mut attributes = Attributes { source, place: &place, report, quantized, count: None, draco };
         let positions = attributes.positions(positions, "attributes/POSITION")?;
@@ -234,9 +237,30 @@ impl<'a> MeshReader<'a> {
         Ok(Some(primitive))
     }
 
+    /// Checks, before they are read, that there is room for the positions and triangles that a primitive says it has.
+    fn check_memory(
+        &self,
+        positions: Index<json::Accessor>,
+        indices: Option<Index<json::Accessor>>,
+        place: &str,
+    ) -> Result<(), ImportError> {
+        let count = |accessor: Index<json::Accessor>| self.source.root.accessors[accessor.value()].count.0;
+        let (positions, indices) = (count(positions), count(indices.unwrap_or(positions)));
+        // A position of 12 bytes; an index of 4, and as many of the triangles that it becomes.
+        let bytes = positions.saturating_mul(12).saturating_add(indices.saturating_mul(8));
+        self.check_bytes(self.bytes.saturating_add(bytes), place)
+    }
+
+    fn check_bytes(&self, bytes: u64, place: &str) -> Result<(), ImportError> {
+        let memory = self.source.limits.check_memory("the meshes with this primitive", bytes, self.source.bytes());
+        memory.map_err(|kind| self.source.at(place, kind))
+    }
+
     fn budget(&mut self, mesh: &TriangleMesh, place: &str) -> Result<(), ImportError> {
         self.vertices += mesh.positions.len() as u64;
         self.triangles += mesh.triangles.len() as u64;
+        self.bytes += mesh.bytes();
+        self.check_bytes(self.bytes, place)?;
         let (most, limit) = (self.vertices.max(self.triangles), self.source.limits.elements);
         if most > limit {
             let cause = format!("with this primitive the scene has {most} elements, more than the limit of {limit}");

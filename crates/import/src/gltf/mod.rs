@@ -44,7 +44,10 @@ mod texture;
 mod uri;
 mod variant;
 
+use std::borrow::Cow;
+use std::collections::BTreeSet;
 use std::path::Path;
+use std::sync::Arc;
 
 use ::gltf::json::validation::Checked;
 use ::gltf::json::{Index, Root};
@@ -56,11 +59,14 @@ use source::Source;
 use texture::Textures;
 
 use crate::cache::{Kept, Key};
+use crate::open::Then;
 use crate::scene::{ImageDesc, SceneDesc};
-use crate::{ImportError, Imported, Options, Report, files};
+use crate::timing::{Stage, timed};
+use crate::{Decode, ImportError, Imported, Options, Report, files};
 
 pub use animation::{AnimatedProperty, Kind as AnimatedKind, PROPERTIES as ANIMATED_PROPERTIES};
 pub use extensions::{EXTENSIONS, Extension, find as find_extension};
+pub(crate) use json::Document;
 pub use stroke::Strokes;
 
 /// Reads a glTF 2.0 file: `.gltf` or `.glb`, told apart by its first bytes.
@@ -71,11 +77,17 @@ pub use stroke::Strokes;
 /// If the file or one of its buffers cannot be read, breaks the format, exceeds the limits, or requires an extension
 /// that is not supported. Images that cannot be read are warnings.
 pub fn read(path: &Path, options: &Options) -> Result<Imported, ImportError> {
-    read_bytes(&files::read(path, &options.limits)?, path, options)
+    read_bytes(&files::read(path, &options.limits)?, path, options, &mut |_, _| Ok(()))
 }
 
-/// As [`read`], of the bytes of the file.
-pub(crate) fn read_bytes(bytes: &[u8], path: &Path, options: &Options) -> Result<Imported, ImportError> {
+/// As [`read`], of the bytes of the file; images are decoded while its meshes are read and `then` is done with them.
+pub(crate) fn read_bytes(
+    bytes: &[u8],
+    path: &Path,
+    options: &Options,
+    then: &mut Then<'_>,
+) -> Result<Imported, ImportError> {
+    let stages = options.stages.as_ref();
     let (text, bin) = if glb::is_glb(bytes) {
         match glb::version(bytes) {
             Some(1) => return Err(json::too_old(path, "1.0 (binary)")),
@@ -90,14 +102,19 @@ pub(crate) fn read_bytes(bytes: &[u8], path: &Path, options: &Options) -> Result
     } else {
         (bytes, None)
     };
-    let json::Document { root, mut value, animations } = json::parse(path, text)?;
+    let parse = || timed(stages, Stage::Parse, || json::parse(path, text));
+    let document = match &options.images {
+        Some(cache) => cache.document(path, parse)?,
+        None => Arc::new(parse()?),
+    };
+    let Document { root, value, animations } = &*document;
     let mut report =
-        Report { animations: animation::list(&animations, &root), scenes: scene_names(&root), ..Report::default() };
+        Report { animations: animation::list(animations, root), scenes: scene_names(root), ..Report::default() };
     report.reads(path);
-    extensions::check(path, &root, &mut report)?;
-    json::check_references(path, &root)?;
-    let source = Source::new(path, &root, bin, &options.limits, &mut report)?;
-    report.variants = variant::names(&root);
+    extensions::check(path, root, &mut report)?;
+    json::check_references(path, root)?;
+    let source = Source::new(path, root, bin, options, &mut report)?;
+    report.variants = variant::names(root);
     let variant = variant::choose(&source, options.variant.as_deref(), &report)?;
     check_accessors(&source)?;
     let shown = match &options.scene {
@@ -105,44 +122,94 @@ pub(crate) fn read_bytes(bytes: &[u8], path: &Path, options: &Options) -> Result
         None => root.scene.map(|s| s.value()).or((!root.scenes.is_empty()).then_some(0)),
     };
     let posed = match &options.play {
-        Some(play) => Some(animation::pose(&source, &animations, play, &mut value, &mut report)?),
+        Some(play) => {
+            let mut value = value.clone();
+            Some((animation::pose(&source, animations, play, &mut value, &mut report)?, value))
+        }
         None => None,
     };
-    let source = match &posed {
-        Some(root) => source.with_root(root),
-        None => source,
+    let (source, value) = match &posed {
+        Some((root, value)) => (source.with_root(root), value),
+        None => (source, value),
     };
-    let nodes = Nodes::new(&source, &value, shown, &mut report)?;
-    report.triangles_all_scenes = triangles_all_scenes(&root);
+    let nodes = Nodes::new(&source, value, shown, &options.only, &mut report)?;
+    report.triangles_all_scenes = triangles_all_scenes(root);
 
     let chosen = shown.filter(|_| root.scene.is_some() || options.scene.is_some());
     let name = chosen.and_then(|s| root.scenes[s].name.clone());
     let name = name.or_else(|| path.file_stem().map(|s| s.to_string_lossy().into_owned())).unwrap_or_default();
     let mut scene = SceneDesc { name, ..SceneDesc::default() };
     let mut textures = Textures::new(&source);
-    scene.materials = material::read(&source, &mut textures, &mut report, !options.without_occlusion)?;
-    let reader = MeshReader::new(&source, &value, variant, options.strokes)?;
-    instance::place(&source, &nodes, reader, &mut scene, &mut report)?;
-    for &node in &nodes.shown {
-        let world = &nodes.world[node];
-        scene.cameras.extend(camera_light::camera(&source, node, world, &mut report)?);
-        scene.lights.extend(camera_light::light(&source, node, world, &mut report)?);
+    let seen = seen(&source, &nodes, variant, options.decode);
+    let occlusion = options.decode == Decode::All;
+    scene.materials = material::read(&source, &mut textures, &mut report, occlusion, &seen)?;
+    let mut of_images = Report::default();
+    let encoded = textures.encoded(&mut of_images)?;
+    let shapes = |scene: &mut SceneDesc, report: &mut Report| {
+        timed(stages, Stage::Meshes, || {
+            let reader = MeshReader::new(&source, value, variant, options.strokes)?;
+            instance::place(&source, &nodes, reader, scene, report)
+        })?;
+        for &node in &nodes.shown {
+            let world = &nodes.world[node];
+            scene.cameras.extend(camera_light::camera(&source, node, world, report)?);
+            scene.lights.extend(camera_light::light(&source, node, world, report)?);
+        }
+        Ok(())
+    };
+    if environment::is_there(&source, shown) {
+        // It is made of images, and turned with all the rest.
+        shapes(&mut scene, &mut report)?;
+        scene.images = images(&source, &textures, &encoded, options, &mut of_images);
+        report.absorb(of_images);
+        if let Some((around, image)) = environment::read(&source, shown, &scene.images, &mut report)? {
+            scene.environment = Some(around);
+            scene.images.push(image);
+        }
+        then(&mut scene, &mut report)?;
+        return Ok(Imported { scene, report });
     }
-    scene.images = images(&source, textures, options, &mut report);
-    if let Some((around, image)) = environment::read(&source, shown, &scene.images, &mut report)? {
-        scene.environment = Some(around);
-        scene.images.push(image);
-    }
+    let (decoded, done) = rayon::join(
+        || images(&source, &textures, &encoded, options, &mut of_images),
+        || shapes(&mut scene, &mut report).and_then(|()| then(&mut scene, &mut report)),
+    );
+    done?;
+    scene.images = decoded;
+    report.absorb(of_images);
     Ok(Imported { scene, report })
 }
 
+/// The materials whose images are decoded.
+fn seen(source: &Source<'_>, nodes: &Nodes, variant: Option<u32>, decode: Decode) -> Vec<bool> {
+    let mut seen = vec![decode == Decode::All; source.root.materials.len()];
+    if decode == Decode::Seen {
+        let meshes = nodes.drawn.iter().filter_map(|&node| source.root.nodes[node].mesh);
+        let meshes: BTreeSet<usize> = meshes.map(|mesh| mesh.value()).collect();
+        for primitive in meshes.iter().flat_map(|&mesh| &source.root.meshes[mesh].primitives) {
+            // What is wrong with it is said when the mesh is read.
+            if let Ok(Some(material)) = variant::material(source, primitive, variant, "") {
+                seen[material] = true;
+            }
+        }
+    }
+    seen
+}
+
 /// The decoded images: those that were kept, if there are any.
-fn images(source: &Source<'_>, textures: Textures<'_>, options: &Options, report: &mut Report) -> Vec<ImageDesc> {
-    let Some(cache) = &options.images else { return textures.decode(report) };
+fn images(
+    source: &Source<'_>,
+    textures: &Textures<'_>,
+    encoded: &[(usize, Cow<'_, [u8]>)],
+    options: &Options,
+    report: &mut Report,
+) -> Vec<ImageDesc> {
+    let Some(cache) = options.images.as_ref().filter(|_| options.decode != Decode::Nothing) else {
+        return textures.decode(encoded, report);
+    };
     let key = Key { limits: *source.limits, images: textures.decoded() };
     let kept = cache.get(source.file, &key).unwrap_or_else(|| {
         let mut said = Report::default();
-        let kept = Kept { key, images: textures.decode(&mut said), report: said };
+        let kept = Kept { key, images: textures.decode(encoded, &mut said), report: said };
         cache.keep(source.file, kept.clone());
         kept
     });

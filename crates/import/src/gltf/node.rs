@@ -5,6 +5,7 @@ use gltf::json::Node;
 use serde_json::Value;
 
 use super::source::Source;
+use crate::only::Choice;
 use crate::{ErrorKind, ImportError, Report};
 
 /// The nodes of a file.
@@ -13,6 +14,8 @@ pub(super) struct Nodes {
     pub(super) world: Vec<DAffine3>,
     /// The nodes of the scene that is shown, parents before children, in the order of the file.
     pub(super) shown: Vec<usize>,
+    /// Those of them whose meshes are wanted.
+    pub(super) drawn: Vec<usize>,
 }
 
 impl Nodes {
@@ -25,6 +28,7 @@ impl Nodes {
         source: &Source<'_>,
         value: &Value,
         scene: Option<usize>,
+        only: &[String],
         report: &mut Report,
     ) -> Result<Self, ImportError> {
         let nodes = &source.root.nodes;
@@ -59,8 +63,33 @@ impl Nodes {
             Some(scene) => descend(nodes, scene_roots(source, scene, &parents)?, visible),
             None => descend(nodes, (0..nodes.len()).filter(|&i| parents[i].is_none()).collect(), visible),
         };
-        Ok(Self { world, shown: shown.into_iter().map(|(i, _)| i).collect() })
+        let shown: Vec<usize> = shown.into_iter().map(|(i, _)| i).collect();
+        Ok(Self { drawn: drawn(source, &shown, only)?, world, shown })
     }
+}
+
+/// The nodes that are called so, with all below them, and those whose meshes are.
+fn drawn(source: &Source<'_>, shown: &[usize], only: &[String]) -> Result<Vec<usize>, ImportError> {
+    let Some(mut choice) = Choice::new(only) else { return Ok(shown.to_vec()) };
+    let root = source.root;
+    let mut whole = vec![false; root.nodes.len()];
+    let mut drawn = Vec::new();
+    // Parents come before their children.
+    for &i in shown {
+        let node = &root.nodes[i];
+        let name = node.name.clone().unwrap_or_else(|| format!("node {i}"));
+        whole[i] |= choice.takes([name.as_str()]);
+        if whole[i] {
+            node.children.iter().flatten().for_each(|child| whole[child.value()] = true);
+        }
+        let mesh =
+            node.mesh.map(|m| root.meshes[m.value()].name.clone().unwrap_or_else(|| format!("mesh {}", m.value())));
+        if choice.takes(mesh.as_deref()) || whole[i] {
+            drawn.push(i);
+        }
+    }
+    choice.finish(source.file)?;
+    Ok(drawn)
 }
 
 /// The nodes below the roots, each with its depth, parents first. A stack of our own: files may nest deeper than

@@ -11,7 +11,8 @@ use super::accessor::ZeroBudget;
 use super::meshopt::{self, Compressed};
 use super::uri::{self, Uri};
 use crate::files::{self, Folder};
-use crate::{ErrorKind, ImportError, Limits, Report};
+use crate::timing::{Stage, timed};
+use crate::{ErrorKind, ImageCache, ImportError, Limits, Options, Report, Stages};
 
 /// The parsed JSON, its references checked, and the bytes that it refers to.
 pub(super) struct Source<'a> {
@@ -19,6 +20,8 @@ pub(super) struct Source<'a> {
     pub(super) root: &'a Root,
     pub(super) folder: Folder,
     pub(super) limits: &'a Limits,
+    pub(super) stages: Option<&'a Stages>,
+    cache: Option<&'a ImageCache>,
     pub(super) zeros: ZeroBudget,
     /// `None`: the file gives no data (a fallback of a compressed buffer).
     buffers: Vec<Option<Cow<'a, [u8]>>>,
@@ -35,12 +38,14 @@ impl<'a> Source<'a> {
         file: &'a Path,
         root: &'a Root,
         bin: Option<&'a [u8]>,
-        limits: &'a Limits,
+        options: &'a Options,
         report: &mut Report,
     ) -> Result<Self, ImportError> {
-        let (folder, zeros) = (Folder::of(file)?, ZeroBudget::new(limits));
+        let (limits, stages) = (&options.limits, options.stages.as_ref());
+        let (folder, zeros) = (Folder::of(file, limits)?, ZeroBudget::new(limits));
         let (buffers, decompressed) = (Vec::new(), BTreeMap::new());
-        let mut source = Self { file, root, folder, limits, zeros, buffers, decompressed };
+        let mut source =
+            Self { file, root, folder, limits, stages, cache: options.images.as_ref(), zeros, buffers, decompressed };
         let compressed = Compressed::all(&source)?;
         let fallback = meshopt::unread_buffers(root, &compressed);
         let mut total = 0_u64;
@@ -84,7 +89,11 @@ impl<'a> Source<'a> {
                     kind => self.at(place, kind),
                 })?;
                 report.reads(&path);
-                files::read(&path, limits)
+                let read = || timed(self.stages, Stage::Read, || files::read(&path, limits));
+                match self.cache {
+                    Some(cache) => cache.bytes(&path, read).map(|bytes| bytes.to_vec()),
+                    None => read(),
+                }
             }
         }
     }

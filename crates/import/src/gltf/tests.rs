@@ -4,7 +4,7 @@ use std::fs;
 
 use serde_json::{Value, json};
 
-use crate::{ErrorKind, ImportError, Imported, Limits, Options};
+use crate::{Decode, ErrorKind, ImportError, Imported, Limits, Options};
 
 /// Reads a file beside images that are hard to compress.
 fn read(document: &Value, limits: Limits) -> Result<Imported, ImportError> {
@@ -58,6 +58,14 @@ fn images_of_one_file_are_one() {
     assert_eq!(scene.images.iter().map(|i| i.name.as_str()).collect::<Vec<_>>(), ["a.png", "b.png"]);
 }
 
+/// Adds a mesh that has the first two materials.
+fn show_materials(document: &mut Value) {
+    document["accessors"] = json!([{"type": "VEC3", "componentType": 5126, "count": 3}]);
+    let primitive = |material: u32| json!({"attributes": {"POSITION": 0}, "material": material});
+    document["meshes"] = json!([{"primitives": [primitive(0), primitive(1)]}]);
+    document["nodes"] = json!([{"mesh": 0}]);
+}
+
 #[test]
 fn kept_images_are_those_that_a_reading_needs() {
     let dir = tempfile::tempdir().expect("temporary folder");
@@ -66,12 +74,14 @@ fn kept_images_are_those_that_a_reading_needs() {
     let images = json!([{"uri": "a.png"}, {"uri": "missing.png"}]);
     let mut document = painted(&images);
     document["materials"][0] = json!({"occlusionTexture": {"index": 0}});
+    show_materials(&mut document);
     fs::write(&path, document.to_string()).expect("file");
     let cache = crate::ImageCache::default();
-    let read = |without_occlusion: bool, image_bytes: u64| {
+    let read = |seen: bool, image_bytes: u64| {
         let limits = Limits { image_bytes, ..Limits::default() };
         let images = Some(cache.clone());
-        let options = Options { without_occlusion, limits, images, ..Options::default() };
+        let decode = if seen { Decode::Seen } else { Decode::All };
+        let options = Options { decode, limits, images, ..Options::default() };
         let read = super::read(&path, &options).expect("readable");
         (read.scene.images[0].width, read.report.warnings.len(), read.report.files.len())
     };
@@ -146,7 +156,7 @@ fn what_lies_out_of_all_range_is_left_out() {
 
 #[test]
 fn images_of_occlusion_alone_are_left_out_where_that_is_asked() {
-    let file = json!({
+    let mut file = json!({
         "asset": {"version": "2.0"},
         "images": [{"uri": "a.png"}, {"uri": "b.png"}],
         "textures": [{"source": 0}, {"source": 1}],
@@ -155,8 +165,9 @@ fn images_of_occlusion_alone_are_left_out_where_that_is_asked() {
             "occlusionTexture": {"index": 1},
         }, {"occlusionTexture": {"index": 0}}],
     });
-    for (without_occlusion, widths) in [(false, [24, 24]), (true, [24, 1])] {
-        let scene = read_with(&file, &Options { without_occlusion, ..Options::default() }).expect("readable").scene;
+    show_materials(&mut file);
+    for (decode, widths) in [(Decode::All, [24, 24]), (Decode::Seen, [24, 1]), (Decode::Nothing, [1, 1])] {
+        let scene = read_with(&file, &Options { decode, ..Options::default() }).expect("readable").scene;
         assert_eq!(scene.images.iter().map(|i| i.width).collect::<Vec<_>>(), widths);
     }
 }

@@ -108,9 +108,12 @@ impl<'a> Textures<'a> {
         self.used.iter().copied().zip(self.wanted.iter().copied()).collect()
     }
 
-    /// Decodes the images that are used, in parallel. One that cannot be read is replaced, with a warning.
-    pub(super) fn decode(self, report: &mut Report) -> Vec<ImageDesc> {
-        let names: Vec<String> = self.used.iter().map(|&i| self.name(i)).collect();
+    /// The images that are to be decoded, by their places among those that are used. One that cannot be read is missing,
+    /// with a warning.
+    ///
+    /// # Errors
+    /// If all together would take too much memory.
+    pub(super) fn encoded(&self, report: &mut Report) -> Result<Vec<(usize, Cow<'a, [u8]>)>, ImportError> {
         let mut encoded = Vec::new();
         // Encoded images are held all at once.
         let mut left = *self.source.limits;
@@ -131,9 +134,23 @@ impl<'a> Textures<'a> {
                 Err(e) => report.warn(e.file, e.place, format!("{}: white is shown instead", e.kind)),
             }
         }
+        let sources: Vec<_> = encoded.iter().map(|(_, bytes)| Encoded { name: "", bytes }).collect();
+        // Those in buffers count once.
+        let owned = |bytes: &Cow<'_, [u8]>| if let Cow::Owned(bytes) = bytes { bytes.len() as u64 } else { 0 };
+        let twice: u64 = encoded.iter().map(|(_, bytes)| bytes.len() as u64 - owned(bytes)).sum();
+        let more = self.source.bytes().saturating_sub(twice);
+        image::check_memory(&sources, self.source.limits, more).map_err(|kind| self.source.at("/images", kind))?;
+        Ok(encoded)
+    }
+
+    /// Decodes images in parallel; white stands for the others that are used. One that cannot be decoded is replaced as
+    /// well, with a warning.
+    pub(super) fn decode(&self, encoded: &[(usize, Cow<'_, [u8]>)], report: &mut Report) -> Vec<ImageDesc> {
+        let names: Vec<String> = self.used.iter().map(|&i| self.name(i)).collect();
         let sources: Vec<_> = encoded.iter().map(|(k, bytes)| Encoded { name: &names[*k], bytes }).collect();
+        let (limits, stages) = (self.source.limits, self.source.stages);
         let mut images: Vec<ImageDesc> = names.iter().map(|n| image::placeholder(n)).collect();
-        for (&(k, _), decoded) in encoded.iter().zip(image::decode_all(&sources, self.source.limits)) {
+        for (&(k, _), decoded) in encoded.iter().zip(image::decode_timed(&sources, limits, stages)) {
             match decoded {
                 Ok(image) => images[k] = image,
                 Err(cause) => {

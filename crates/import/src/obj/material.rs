@@ -1,6 +1,6 @@
 //! MTL materials mapped onto the physically based one. The mapping is described in [`super`].
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -9,12 +9,13 @@ use glam::Vec3;
 use super::mtl::{Entry, find_file};
 use super::texture::Texture;
 use crate::files::{self, Folder};
-use crate::image::{Encoded, decode_all};
+use crate::image::{Encoded, check_memory, decode_timed};
 use crate::scene::{
     AlphaMode, Anisotropy, Channel, Clearcoat, ImageDesc, MaterialDesc, MaterialModel, PbrMaterial, Pixels, Sheen,
     TextureRef,
 };
-use crate::{ImportError, Limits, Report};
+use crate::timing::{Stage, timed};
+use crate::{ImportError, Options, Report};
 
 /// How high the full range of a height map is with `-bm 1`, in widths of the texture: OBJ does not say.
 const BUMP_HEIGHT: f32 = 0.01;
@@ -39,16 +40,21 @@ pub(crate) fn neutral(name: &str, has_colors: bool) -> MaterialDesc {
     MaterialDesc { name: name.to_owned(), model: MaterialModel::Pbr(Box::new(pbr)) }
 }
 
-/// Maps materials, and reads the images they name. What cannot be read is a warning, and left out.
+/// Maps materials, and reads the images that those named in `shown` name. What cannot be read is a warning, and left out.
 pub(super) fn map(
     entries: &[Entry],
     folder: &Folder,
-    limits: &Limits,
+    options: &Options,
+    shown: &HashSet<&str>,
     report: &mut Report,
-) -> (Vec<MaterialDesc>, Vec<ImageDesc>) {
+) -> Result<(Vec<MaterialDesc>, Vec<ImageDesc>), ImportError> {
     let mut files = ImageFiles::default();
-    let maps: Vec<Maps> = entries.iter().map(|e| Maps::find(e, folder, &mut files, report)).collect();
-    let mut images = files.read(limits, report);
+    let find = |e: &Entry| match shown.contains(e.material.name.as_str()) {
+        true => Maps::find(e, folder, &mut files, report),
+        false => Maps::default(),
+    };
+    let maps: Vec<Maps> = entries.iter().map(find).collect();
+    let mut images = files.read(options, report)?;
     let materials = entries
         .iter()
         .zip(&maps)
@@ -58,7 +64,7 @@ pub(super) fn map(
             MaterialDesc { name: entry.material.name.clone(), model: MaterialModel::Pbr(Box::new(pbr)) }
         })
         .collect();
-    (materials, images.descs)
+    Ok((materials, images.descs))
 }
 
 fn warn_of_unsupported(entry: &Entry, report: &mut Report) {
@@ -94,7 +100,8 @@ impl ImageFiles {
         })
     }
 
-    fn read(&self, limits: &Limits, report: &mut Report) -> Images {
+    fn read(&self, options: &Options, report: &mut Report) -> Result<Images, ImportError> {
+        let (limits, stages) = (&options.limits, options.stages.as_ref());
         self.paths.iter().for_each(|path| report.reads(path));
         let mut left = *limits;
         let read = |path: &PathBuf| {
@@ -103,11 +110,16 @@ impl ImageFiles {
             left.file_bytes -= bytes.len() as u64;
             Ok::<_, ImportError>(bytes)
         };
-        let bytes: Vec<_> = self.paths.iter().map(read).collect();
+        let bytes: Vec<_> = timed(stages, Stage::Read, || self.paths.iter().map(read).collect());
         let names: Vec<String> = self.paths.iter().map(|p| p.to_string_lossy().into_owned()).collect();
         let sources: Vec<_> =
             names.iter().zip(&bytes).filter_map(|(name, b)| Some(Encoded { name, bytes: b.as_ref().ok()? })).collect();
-        let mut decoded = decode_all(&sources, limits).into_iter();
+        let held = self
+            .paths
+            .first()
+            .map_or(Ok(()), |path| check_memory(&sources, limits, 0).map_err(|kind| ImportError::new(path, "", kind)));
+        held?;
+        let mut decoded = decode_timed(&sources, limits, stages).into_iter();
         let mut images = Images { descs: Vec::new(), index: Vec::new() };
         for (path, bytes) in self.paths.iter().zip(bytes) {
             let image = match bytes {
@@ -126,7 +138,7 @@ impl ImageFiles {
             };
             images.index.push(index);
         }
-        images
+        Ok(images)
     }
 }
 
@@ -134,6 +146,7 @@ impl ImageFiles {
 type Map = Option<(Texture, usize)>;
 
 /// The textures of a material.
+#[derive(Default)]
 struct Maps {
     base: Map,
     specular: Map,

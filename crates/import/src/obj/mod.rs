@@ -65,17 +65,19 @@ mod polygon;
 mod text;
 mod texture;
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use glam::DAffine3;
 
 pub(crate) use self::material::neutral;
-use self::model::Model;
+use self::model::{Model, Part};
 pub(crate) use self::text::number;
 use crate::files::{self, Folder, Input};
+use crate::only::Choice;
 use crate::scene::{GeometryDesc, ImageDesc, InstanceDesc, MaterialDesc, MeshDesc, SurfaceDesc};
-use crate::{ImportError, Imported, Options, Report, SceneDesc};
+use crate::timing::{Stage, timed};
+use crate::{Decode, ImportError, Imported, Options, Report, SceneDesc};
 
 /// Reads an OBJ file and the material libraries and images it names.
 ///
@@ -110,9 +112,17 @@ pub fn read_bytes(bytes: Vec<u8>, path: impl AsRef<Path>, options: &Options) -> 
 pub(crate) fn read_input(input: Input<'_>, path: &Path, options: &Options) -> Result<Imported, ImportError> {
     let mut report = Report::default();
     report.reads(path);
-    let mut model = parse::parse(input, path, &options.limits, &mut report)?;
-    let meshes = mesh::build(&mut model, path, "line", &mut report);
-    let materials = Materials::load(&model, path, options, &mut report);
+    let stages = options.stages.as_ref();
+    let mut model = parse::parse(input, path, options, &mut report)?;
+    let mut meshes = timed(stages, Stage::Meshes, || mesh::build(&mut model, path, "line", &mut report));
+    if let Some(mut choice) = Choice::new(&options.only) {
+        let wanted: Vec<bool> = model.parts.iter().map(|part| choice.takes(names(part))).collect();
+        choice.finish(path)?;
+        let (mut of_part, mut of_mesh) = (wanted.iter(), wanted.iter());
+        model.parts.retain(|_| of_part.next() == Some(&true));
+        meshes.parts.retain(|_| of_mesh.next() == Some(&true));
+    }
+    let materials = Materials::load(&model, path, options, &mut report)?;
     let name = files::stem(path);
     report.triangles_all_scenes = meshes.parts.iter().map(|m| m.triangles.len() as u64).sum();
     let geometries = model.parts.iter().zip(meshes.parts).map(|(part, mesh)| {
@@ -137,6 +147,11 @@ pub(crate) fn read_input(input: Input<'_>, path: &Path, options: &Options) -> Re
     Ok(Imported { scene, report })
 }
 
+/// What a part may be asked for by: its object, its groups, both of them.
+fn names(part: &Part) -> impl Iterator<Item = &str> {
+    [part.object.as_str(), part.group.as_str()].into_iter().chain(part.group.split_ascii_whitespace())
+}
+
 /// The materials of a model.
 struct Materials {
     materials: Vec<MaterialDesc>,
@@ -148,12 +163,20 @@ struct Materials {
 }
 
 impl Materials {
-    fn load(model: &Model, path: &Path, options: &Options, report: &mut Report) -> Self {
+    fn load(model: &Model, path: &Path, options: &Options, report: &mut Report) -> Result<Self, ImportError> {
         let limits = &options.limits;
-        let (mut materials, images, found) = match Folder::of(path) {
+        let (mut materials, images, found) = match Folder::of(path, limits) {
             Ok(folder) => {
                 let entries = mtl::load(&model.libraries, path, &folder, limits, report);
-                let (materials, images) = material::map(&entries, &folder, limits, report);
+                let shown: HashSet<&str> = match options.decode {
+                    Decode::All => entries.iter().map(|e| e.material.name.as_str()).collect(),
+                    Decode::Seen => {
+                        let names = model.parts.iter().filter_map(|part| part.material);
+                        names.map(|m| mtl::key(&model.materials[m as usize].1)).collect()
+                    }
+                    Decode::Nothing => HashSet::new(),
+                };
+                let (materials, images) = material::map(&entries, &folder, options, &shown, report)?;
                 let found = entries.into_iter().enumerate().map(|(i, e)| (e.material.name, i)).collect();
                 (materials, images, found)
             }
@@ -185,7 +208,7 @@ impl Materials {
             materials.push(neutral("", has_colors));
             materials.len() - 1
         });
-        Self { materials, images, of_name, none }
+        Ok(Self { materials, images, of_name, none })
     }
 }
 

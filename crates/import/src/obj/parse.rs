@@ -6,7 +6,8 @@ use std::path::Path;
 use super::model::{Corner, Model, NONE, Part, VertexIndex};
 use super::text::{Blocks, Lines, name, number, plain_number, split_keyword, words};
 use crate::files::Input;
-use crate::{ErrorKind, ImportError, Limits, Report, unit};
+use crate::timing::{Stage, timed};
+use crate::{ErrorKind, ImportError, Limits, Options, Report, unit};
 
 /// How often something came up, and where first.
 #[derive(Default)]
@@ -36,17 +37,18 @@ pub(super) fn place(line: u32) -> String {
 }
 
 /// Reads the statements of an OBJ file. `file` is for messages.
-pub(super) fn parse(input: Input<'_>, file: &Path, limits: &Limits, report: &mut Report) -> Result<Model, ImportError> {
-    let mut parser = Parser::new(file, limits);
-    let mut blocks = Blocks::new(input)?;
+pub(super) fn parse(
+    input: Input<'_>,
+    file: &Path,
+    options: &Options,
+    report: &mut Report,
+) -> Result<Model, ImportError> {
+    let stages = options.stages.as_ref();
+    let mut parser = Parser::new(file, &options.limits);
+    let mut blocks = timed(stages, Stage::Read, || Blocks::new(input))?;
     let mut first = 1;
-    while let Some(text) = blocks.next()? {
-        let mut lines = Lines::new(text, first);
-        while let Some((number, line)) = lines.next() {
-            parser.line = number;
-            parser.statement(line)?;
-        }
-        first = lines.number();
+    while let Some(text) = timed(stages, Stage::Read, || blocks.next())? {
+        first = timed(stages, Stage::Parse, || parser.lines(text, first))?;
     }
     parser.finish(report)
 }
@@ -97,6 +99,16 @@ impl<'a> Parser<'a> {
 
     fn invalid(&self, cause: impl Into<String>) -> ImportError {
         ImportError::invalid(self.file, place(self.line), cause)
+    }
+
+    /// Reads lines from number `first` on, and returns the number after the last one.
+    fn lines(&mut self, text: &[u8], first: u32) -> Result<u32, ImportError> {
+        let mut lines = Lines::new(text, first);
+        while let Some((number, line)) = lines.next() {
+            self.line = number;
+            self.statement(line)?;
+        }
+        Ok(lines.number())
     }
 
     fn statement(&mut self, line: &[u8]) -> Result<(), ImportError> {

@@ -30,8 +30,8 @@ pub(super) fn build(
     report.reads(path);
     let mut builder = Builder {
         path,
-        folder: Folder::of(path)?,
-        options: Options { up: None, ..options.clone() },
+        folder: Folder::of(path, &options.limits)?,
+        options: Options { up: None, only: Vec::new(), ..options.clone() },
         inclusion,
         reference: scene_file.conventions.unwrap_or(by_notation) == Conventions::Reference,
         scene: SceneDesc::default(),
@@ -235,7 +235,8 @@ impl Builder<'_> {
         renamed: &[(String, usize)],
     ) -> Result<ReadModel, ImportError> {
         let format = Format::of(path)?;
-        let Imported { scene: mut model, report } = read_as(format, path, &self.options, self.inclusion)?;
+        let Imported { scene: mut model, report } =
+            read_as(format, path, &self.options, self.inclusion, &mut |_, _| Ok(()))?;
         let triangles_all_scenes = report.triangles_all_scenes;
         self.report.absorb(report);
 

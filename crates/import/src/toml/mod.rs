@@ -21,6 +21,7 @@ use std::cell::Cell;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
+use crate::open::finish;
 use crate::{ErrorKind, ImportError, Imported, Options, files};
 use schema::SceneFile;
 
@@ -62,7 +63,11 @@ impl Inclusion {
 /// # Errors
 /// With the line of what breaks the schema (in TOML, of the table it is in), or the element (`objects[2]`) of what makes no sense.
 pub fn read(path: &Path, options: &Options) -> Result<Imported, ImportError> {
-    read_bytes(&files::read(path, &options.limits)?, path, options, &Inclusion::default())?.finished(path, options)
+    let bytes = files::read(path, &options.limits)?;
+    let mut imported = read_bytes(&bytes, path, options, &Inclusion::default())?;
+    imported.scene.keep_only(&options.only, path)?;
+    finish(&mut imported.scene, &mut imported.report, path, options)?;
+    Ok(imported)
 }
 
 /// As [`read`], of the bytes of a file that others may have led to; unfinished.
