@@ -81,7 +81,12 @@ impl Source {
             Self::Arrays(mesh) => Ok((mesh.desc(), Vec::new())),
             Self::File { path, up, variant } => {
                 let up = up.as_deref().map(str::parse::<UpAxis>).transpose().map_err(error::value)?;
-                let options = Options { up, variant: variant.clone(), decode: Decode::Seen, ..Options::default() };
+                let options = Options {
+                    up,
+                    variant: variant.clone(),
+                    decode: firsthit_import::Decode::Seen,
+                    ..Options::default()
+                };
                 let Imported { scene, report } =
                     firsthit_import::open(path, &options).map_err(|e| error::import(&e))?;
                 Ok((scene, report.warnings.iter().map(ToString::to_string).collect()))

@@ -34,14 +34,20 @@ pub(super) fn complete(model: &mut Model) {
 
 /// The unit normal of a face; zero without area.
 pub(super) fn of_face(model: &Model, face: usize, places: &mut Vec<DVec3>) -> DVec3 {
+    area_of_face(model, face, places).normalize_or_zero()
+}
+
+/// Twice the area of a face, along its normal.
+#[inline]
+fn area_of_face(model: &Model, face: usize, places: &mut Vec<DVec3>) -> DVec3 {
     match model.corners_of(face) {
         &[a, b, c] => {
             let [a, b, c] = [a, b, c].map(|corner| model.place(corner));
-            (b - a).cross(c - a).normalize_or_zero()
+            (b - a).cross(c - a)
         }
         _ => {
             model.places(face, places);
-            area_vector(places).normalize_or_zero()
+            area_vector(places)
         }
     }
 }
@@ -62,13 +68,13 @@ impl Weighted {
         model.places(face, &mut self.places);
         if let &[a, b, c] = self.places.as_slice() {
             let (ab, bc, ca) = (b - a, c - b, a - c);
-            let area = ab.cross(c - a);
-            self.normal = area.normalize_or_zero();
+            let vector = ab.cross(c - a);
+            self.normal = vector.normalize_or_zero();
             if self.normal == DVec3::ZERO {
                 self.angles.resize(3, 0.0);
                 return;
             }
-            let area = area.length();
+            let area = vector.length();
             let (at_a, at_b) = (f64::atan2(area, -ab.dot(ca)), f64::atan2(area, -bc.dot(ab)));
             // What the other two leave of half a turn.
             self.angles.extend([at_a, at_b, (std::f64::consts::PI - at_a - at_b).max(0.0)]);
@@ -199,10 +205,11 @@ fn by_creases(model: &mut Model) {
     let least = (0.5 * CREASE_DEGREES).to_radians().cos() + 1e-9;
     let mut creased = vec![false; model.positions.len()];
     for face in 0..model.faces.len() {
-        let normal = of_face(model, face, &mut weighted.places);
+        let normal = area_of_face(model, face, &mut weighted.places);
+        let longest = least * normal.length();
         for &corner in model.corners_of(face) {
             let p = at(model, corner);
-            if !(normal.dot(means[p]) > least) {
+            if !(normal.dot(means[p]) > longest) {
                 creased[p] = true;
             }
         }
