@@ -87,10 +87,11 @@ impl Layout {
         let place = format!("/accessors/{i}");
         let json = &source.root.accessors[i];
         let Checked::Valid(kind) = json.type_ else {
-            return Err(source.invalid(place + "/type", "is no type of glTF"));
+            return Err(source.invalid(place + "/type", "is none of SCALAR, VEC2, VEC3, VEC4, MAT2, MAT3, MAT4"));
         };
         let Checked::Valid(component) = json.component_type else {
-            return Err(source.invalid(place + "/componentType", "is no component type of glTF"));
+            let cause = "is none of 5120, 5121, 5122, 5123, 5125, 5126";
+            return Err(source.invalid(place + "/componentType", cause));
         };
         let component = component.0;
         let count = json.count.0;

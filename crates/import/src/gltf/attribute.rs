@@ -123,7 +123,7 @@ impl Attributes<'_> {
         };
         let place = format!("{}/indices", self.place);
         if accessor.kind != Type::Scalar || !INDICES.contains(&accessor.format) {
-            return Err(self.source.invalid(place, format!("expected SCALAR of {}", names(INDICES))));
+            return Err(self.source.invalid(place, mismatch(index, &accessor, &[Type::Scalar], INDICES)));
         }
         let restart = match accessor.format.0 {
             U8 => 0xff,
@@ -156,14 +156,7 @@ impl Attributes<'_> {
         };
         let place = || format!("{}/{at}", self.place);
         if !kinds.contains(&accessor.kind) || !formats.contains(&accessor.format) {
-            let cause = format!(
-                "accessor {} is {:?} of {}; expected {kinds:?} of {}",
-                index.value(),
-                accessor.kind,
-                names(&[accessor.format]),
-                names(formats)
-            );
-            return Err(self.source.invalid(place(), cause));
+            return Err(self.source.invalid(place(), mismatch(index, &accessor, kinds, formats)));
         }
         if let Some(count) = self.count.filter(|&c| c != accessor.count) {
             let cause = format!("accessor {} has {} elements for {count} vertices", index.value(), accessor.count);
@@ -194,9 +187,36 @@ impl Attributes<'_> {
     }
 }
 
+/// What an accessor is, and what it should be.
+fn mismatch(index: Index<json::Accessor>, accessor: &Accessor<'_>, kinds: &[Type], formats: &[Format]) -> String {
+    let kinds: Vec<String> = kinds.iter().map(kind_name).collect();
+    format!(
+        "accessor {} is {} of {}, expected {} of {}",
+        index.value(),
+        kind_name(&accessor.kind),
+        names(&[accessor.format]),
+        kinds.join(" or "),
+        names(formats)
+    )
+}
+
+/// The format's name of a type.
+fn kind_name(kind: &Type) -> String {
+    format!("{kind:?}").to_uppercase()
+}
+
+/// The names of component types, which the file has as numbers.
 fn names(formats: &[Format]) -> String {
     let name = |&(component, normalized): &Format| {
-        format!("{}{}", component.as_gl_enum(), if normalized { " normalized" } else { "" })
+        let name = match component {
+            I8 => "BYTE",
+            U8 => "UNSIGNED_BYTE",
+            I16 => "SHORT",
+            U16 => "UNSIGNED_SHORT",
+            U32 => "UNSIGNED_INT",
+            F32 => "FLOAT",
+        };
+        format!("{name} ({}{})", component.as_gl_enum(), if normalized { ", normalized" } else { "" })
     };
     formats.iter().map(name).collect::<Vec<_>>().join(", ")
 }

@@ -18,14 +18,27 @@ pub(super) fn version(bytes: &[u8]) -> Option<u32> {
     word(bytes, 4)
 }
 
+/// What a file that is called a GLB begins with, if that is neither a GLB's first word nor JSON.
+pub(super) fn wrong_magic(bytes: &[u8]) -> Option<String> {
+    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let is_json = text.iter().find(|b| !b.is_ascii_whitespace()).is_some_and(|&b| b == b'{');
+    (!is_json && !is_glb(bytes)).then(|| bytes[..bytes.len().min(4)].escape_ascii().to_string())
+}
+
 /// Takes a GLB apart. Chunks of unknown kinds are passed over, as the specification asks.
 ///
 /// # Errors
-/// What is wrong, with the byte at which it stands.
-pub(super) fn split(bytes: &[u8]) -> Result<Glb<'_>, String> {
-    let length = word(bytes, 8).ok_or("the header is cut off")? as usize;
+/// What is wrong, and the byte at which it stands.
+pub(super) fn split(bytes: &[u8]) -> Result<Glb<'_>, (usize, String)> {
+    let Some(length) = word(bytes, 8).map(|length| length as usize) else {
+        return Err((0, format!("the header is cut off: the file has {} of its 12 bytes", bytes.len())));
+    };
     if length > bytes.len() {
-        return Err(format!("the header says {length} bytes, but the file has {}", bytes.len()));
+        return Err((8, format!("the header says {length} bytes, but the file has {}", bytes.len())));
+    }
+    if length < 20 {
+        let cause = format!("the header says {length} bytes, but it and a JSON chunk have at least 20");
+        return Err((8, cause));
     }
     // What comes after the end is no part of it.
     let bytes = &bytes[..length];
@@ -33,23 +46,26 @@ pub(super) fn split(bytes: &[u8]) -> Result<Glb<'_>, String> {
     let (mut at, mut number) = (12, 0);
     while at < length {
         let (Some(size), Some(kind)) = (word(bytes, at), word(bytes, at + 4)) else {
-            return Err(format!("the chunk header at byte {at} is cut off"));
+            return Err((at, format!("a chunk's header is cut off: {} of its 8 bytes are there", length - at)));
         };
         let start = at + 8;
         let Some(data) = bytes.get(start..).and_then(|rest| rest.get(..size as usize)) else {
-            return Err(format!("the chunk at byte {at} says {size} bytes, but {} follow", length - start));
+            return Err((at, format!("the chunk says {size} bytes, but {} follow", length - start)));
         };
         match (number, kind) {
             (0, JSON) => glb.json = data,
-            (0, _) => return Err(format!("the first chunk is {}, not JSON", kind_name(kind))),
+            (0, _) => return Err((at + 4, format!("the first chunk is {}, expected JSON", kind_name(kind)))),
             (1, BIN) => glb.bin = Some(data),
-            (_, JSON | BIN) => return Err(format!("chunk {number} is a misplaced {}", kind_name(kind))),
+            (_, JSON | BIN) => {
+                let cause = format!("chunk {number} is {}; expected one JSON, then at most one BIN", kind_name(kind));
+                return Err((at + 4, cause));
+            }
             _ => {}
         }
         at = start + size as usize;
         number += 1;
     }
-    if number == 0 { Err("there is no JSON chunk".into()) } else { Ok(glb) }
+    Ok(glb)
 }
 
 const JSON: u32 = u32::from_le_bytes(*b"JSON");

@@ -4,10 +4,10 @@ use std::fmt;
 use std::path::Path;
 
 use gltf::json::{Index, Root};
-use serde::Deserialize;
 use serde_json::Value;
-use serde_path_to_error::Segment;
 
+use super::typed;
+pub(super) use super::typed::typed;
 use crate::ImportError;
 
 /// A file's JSON.
@@ -30,8 +30,7 @@ pub(super) fn parse(file: &Path, text: &[u8]) -> Result<Document, ImportError> {
     // the chunk of a GLB up with zeros.
     let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
     let end = text.iter().rposition(|&b| b != 0).map_or(0, |last| last + 1);
-    let mut value: Value =
-        serde_json::from_slice(&text[..end]).map_err(|e| ImportError::invalid(file, "", format!("not JSON: {e}")))?;
+    let mut value = typed::parse(file, &text[..end])?;
     check_version(file, &value)?;
     let mut animations = match value.get_mut("animations").map(Value::take) {
         Some(Value::Array(animations)) => animations,
@@ -48,6 +47,7 @@ pub(super) fn parse(file: &Path, text: &[u8]) -> Result<Document, ImportError> {
         }
     }
     whole_numbers(&mut value);
+    typed::check_objects(file, &value)?;
     let root = typed(file, "", &value)?;
     Ok(Document { root, value, animations })
 }
@@ -69,37 +69,24 @@ fn whole_numbers(value: &mut Value) {
     }
 }
 
-/// Reads a value as a type; an error tells where in the value it is.
-pub(super) fn typed<'de, T: Deserialize<'de>>(file: &Path, pointer: &str, value: &'de Value) -> Result<T, ImportError> {
-    serde_path_to_error::deserialize(value).map_err(|e| {
-        let mut place = pointer.to_owned();
-        for segment in e.path() {
-            match segment {
-                Segment::Seq { index } => place += &format!("/{index}"),
-                Segment::Map { key } | Segment::Enum { variant: key } => {
-                    place += &format!("/{}", key.replace('~', "~0").replace('/', "~1"));
-                }
-                Segment::Unknown => {}
-            }
-        }
-        ImportError::invalid(file, place, e.into_inner().to_string())
-    })
-}
-
 fn check_version(file: &Path, value: &Value) -> Result<(), ImportError> {
     let invalid = |place: &str, cause: String| Err(ImportError::invalid(file, place, cause));
     if !value.is_object() {
-        return invalid("", "not glTF: the JSON is no object".into());
+        return invalid("", format!("not glTF: the JSON is {}, expected an object", kind(value)));
     }
     let Some(asset) = value.get("asset") else {
-        return invalid("/asset", "not glTF 2: it must say its version here".into());
+        return invalid(
+            "/asset",
+            "is missing; expected an object with glTF's version, as {\"version\": \"2.0\"}".into(),
+        );
     };
     let version = match asset.get("version") {
         Some(Value::String(version)) => version,
         // glTF 1.0 files may say it as a number or leave it out.
         None if value.get("accessors").is_some_and(Value::is_object) => return Err(too_old(file, "1.0")),
         Some(Value::Number(number)) if number.as_f64() == Some(1.0) => return Err(too_old(file, "1.0")),
-        _ => return invalid("/asset/version", "expected text like \"2.0\"".into()),
+        Some(other) => return invalid("/asset/version", format!("is {}, expected text like \"2.0\"", kind(other))),
+        None => return invalid("/asset/version", "is missing; expected text like \"2.0\"".into()),
     };
     match numbers(version) {
         Some((2, _)) => {}
@@ -117,6 +104,18 @@ fn check_version(file: &Path, value: &Value) -> Result<(), ImportError> {
             Err(ImportError::unsupported(file, "/asset/minVersion", cause))
         }
         _ => Ok(()),
+    }
+}
+
+/// What a value is, and its number or text if that is short.
+fn kind(value: &Value) -> String {
+    match value {
+        Value::Null => "null".into(),
+        Value::Bool(_) | Value::Number(_) => value.to_string(),
+        Value::String(text) if text.len() <= 32 => value.to_string(),
+        Value::String(_) => "a text".into(),
+        Value::Array(_) => "an array".into(),
+        Value::Object(_) => "an object".into(),
     }
 }
 

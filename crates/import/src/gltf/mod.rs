@@ -41,6 +41,7 @@ mod tangent;
 #[cfg(test)]
 mod tests;
 mod texture;
+mod typed;
 mod uri;
 mod variant;
 
@@ -94,12 +95,15 @@ pub(crate) fn read_bytes(
             Some(2) | None => {}
             Some(other) => {
                 let cause = format!("version {other} of the binary container is not supported, only 2");
-                return Err(ImportError::unsupported(path, "", cause));
+                return Err(ImportError::unsupported(path, "byte 4", cause));
             }
         }
-        let glb = glb::split(bytes).map_err(|cause| ImportError::invalid(path, "", cause))?;
+        let glb = glb::split(bytes).map_err(|(at, cause)| ImportError::invalid(path, format!("byte {at}"), cause))?;
         (glb.json, glb.bin)
     } else {
+        if let (true, Some(found)) = (files::format_extension(path) == "glb", glb::wrong_magic(bytes)) {
+            return Err(ImportError::invalid(path, "byte 0", format!("begins with '{found}', expected 'glTF'")));
+        }
         (bytes, None)
     };
     let parse = || timed(stages, Stage::Parse, || json::parse(path, text));

@@ -153,8 +153,10 @@ fn local(
         if node.translation.is_some() || node.rotation.is_some() || node.scale.is_some() {
             return Err(source.invalid(place("matrix"), "stands beside translation, rotation or scale"));
         }
-        if [m[3], m[7], m[11], m[15]] != [0.0, 0.0, 0.0, 1.0] {
-            return Err(source.invalid(place("matrix"), "is not affine: its last row is not (0, 0, 0, 1)"));
+        let last = [m[3], m[7], m[11], m[15]];
+        if last != [0.0, 0.0, 0.0, 1.0] {
+            let cause = format!("is not affine: its last row is {last:?}, expected [0, 0, 0, 1]");
+            return Err(source.invalid(place("matrix"), cause));
         }
         let column = |k: usize| DVec3::new(m[k], m[k + 1], m[k + 2]);
         DAffine3 { matrix3: DMat3::from_cols(column(0), column(4), column(8)), translation: column(12) }
