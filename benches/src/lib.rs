@@ -6,6 +6,7 @@
 //! * `cargo run --release -p firsthit-benches --bin growth`: time of a ray as one mesh grows from 1,000 triangles to 10 M.
 //! * `cargo run --release -p firsthit-benches --bin effects`: what it buys that scenes are rendered by kernels without the
 //!   effects that they do not call for.
+//! * `cargo run --release -p firsthit-benches --bin files`: what comes of every model file of a folder (Linux only).
 //! * `cargo run --release -p firsthit-benches --bin leaks`: rays lost through closed meshes, firsthit beside its peers.
 //! * `cargo run --release -p firsthit-benches --bin points`: closest points, signed distances, inside and outside beside peers,
 //!   and what one query a call costs.
@@ -14,6 +15,8 @@
 pub mod brute;
 pub mod effects;
 pub mod engine;
+#[cfg(target_os = "linux")]
+pub mod files;
 pub mod generated;
 pub mod growth;
 pub mod judge;

@@ -55,6 +55,8 @@ fn at_model(args: &InspectArgs, error: &dyn std::error::Error) -> Failure {
 #[derive(Serialize)]
 struct Inspection<'a> {
     model: String,
+    /// The files that were read: the model and all that it led to.
+    files: Vec<String>,
     /// Of the scene that is rendered: each instance counted.
     triangles: u64,
     /// Of every node of every scene in the file.
@@ -241,6 +243,7 @@ impl<'a> Inspection<'a> {
         let counts = Counts::new(scene);
         Self {
             model,
+            files: report.files.iter().map(|f| f.display().to_string()).collect(),
             triangles: counts.triangles,
             triangles_all_scenes: report.triangles_all_scenes,
             stored_triangles: total(|m| m.triangles),
