@@ -316,11 +316,12 @@ pub(crate) struct SceneArgs {
     #[arg(long, value_name = "NAME|INDEX")]
     pub(crate) scene: Option<String>,
 
-    /// Draw points (glTF's) as balls of this radius, in units of their mesh
+    /// Draw points (glTF's) as balls of this radius, in units of their mesh [default: a 400th of the extent of all of
+    /// them, if there are at most 10,000]
     #[arg(long, value_name = "RADIUS", value_parser = values::positive)]
     pub(crate) points: Option<f64>,
 
-    /// Draw lines (glTF's) as rods of this radius, in units of their mesh
+    /// Draw lines (glTF's) as rods of this radius, in units of their mesh [default: as for points]
     #[arg(long, value_name = "RADIUS", value_parser = values::positive)]
     pub(crate) lines: Option<f64>,
 

@@ -63,7 +63,7 @@ impl Shot {
             variant: scene.variant.clone(),
             scene: scene.scene.clone(),
             play,
-            strokes: gltf::Strokes { points: radius(scene.points), lines: radius(scene.lines) },
+            strokes: gltf::Strokes { points: radius(scene.points), lines: radius(scene.lines), thin: true },
             images: self.play.is_some().then(|| self.images.clone()),
             decode: Decode::Seen,
             ..args.load.options()

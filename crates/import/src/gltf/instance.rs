@@ -50,7 +50,9 @@ pub(super) fn place(
         let index = Index::new(i as u32);
         let name = json.name.clone().unwrap_or_else(|| format!("mesh {i}"));
         let shown = shown_by.remove(&i).unwrap_or_default();
-        let mut plain = Some(reader.read(index, None, report)?);
+        let primitives = reader.read(index, None, report)?;
+        mesh::warn_of_missing_uvs(source, i, &primitives, &scene.materials, report);
+        let mut plain = Some(primitives);
         let mut shared = None;
         for &(node, _) in shown.iter().filter(|(_, how)| *how == Placement::Shared) {
             shared = shared.or_else(|| add_mesh(scene, &name, plain.take()?));

@@ -14,7 +14,7 @@ use super::source::Source;
 use super::stroke::{self, Strokes};
 use super::tangent;
 use super::variant;
-use crate::scene::TriangleMesh;
+use crate::scene::{MaterialDesc, MaterialModel, TriangleMesh};
 use crate::{ErrorKind, ImportError, Report, unit};
 
 /// Triangles as the file has them: morph targets applied, normals and tangents only where they are given.
@@ -40,6 +40,8 @@ pub(super) struct MeshReader<'a> {
     /// The file's JSON: the typed model does not have all that morph targets change.
     value: &'a Value,
     strokes: Strokes,
+    /// Points and ends of lines so far for which no radius is given.
+    thin: u64,
     quantized: bool,
     draco: DracoPrimitives,
     variant: Option<u32>,
@@ -74,11 +76,15 @@ impl<'a> MeshReader<'a> {
     ) -> Result<Self, ImportError> {
         let quantized = source.uses("KHR_mesh_quantization");
         let draco = DracoPrimitives::new(source)?;
-        Ok(Self { source, value, strokes, quantized, draco, variant, read: 0, vertices: 0, triangles: 0, bytes: 0 })
+        let (read, vertices, triangles, bytes, thin) = (0, 0, 0, 0, 0);
+        Ok(Self { source, value, strokes, thin, quantized, draco, variant, read, vertices, triangles, bytes })
     }
 
     /// Warns, once for a file, of primitives of points and lines that are not drawn.
     pub(super) fn warn_of_undrawn(&self, report: &mut Report) {
+        if self.strokes.thin {
+            return;
+        }
         let mut count = 0_u64;
         let mut first = None;
         for (i, mesh) in self.source.root.meshes.iter().enumerate() {
@@ -203,7 +209,13 @@ impl<'a> MeshReader<'a> {
             Some(index) => attributes.indices(index, count)?,
             None => (0..count as u32).collect(),
         };
-        if let Some(radius) = self.strokes.radius(mode) {
+        let radius = match self.strokes.radius(mode) {
+            None if self.strokes.thin && !makes_triangles(mode) => {
+                self.thin_radius(&mesh.positions, indices.len(), &place, report)
+            }
+            given => given,
+        };
+        if let Some(radius) = radius {
             let most = (indices.len() as u64).saturating_mul(stroke::MOST_ELEMENTS);
             if most > source.limits.elements {
                 let cause = format!("{} points or lines to be drawn would take too many triangles", indices.len());
@@ -237,6 +249,17 @@ impl<'a> MeshReader<'a> {
         Ok(Some(primitive))
     }
 
+    /// The radius of points or lines for which none is given; `None` where they are not drawn.
+    fn thin_radius(&mut self, positions: &[Vec3], ends: usize, place: &str, report: &mut Report) -> Option<f32> {
+        self.thin = self.thin.saturating_add(ends as u64);
+        if self.thin > stroke::MOST_THIN {
+            let message = format!("{ends} points or ends of lines are too many to be drawn unless a radius is given");
+            report.warn(self.source.file, place, message);
+            return None;
+        }
+        stroke::thin_radius(positions)
+    }
+
     /// Checks, before they are read, that there is room for the positions and triangles that a primitive says it has.
     fn check_memory(
         &self,
@@ -267,6 +290,25 @@ impl<'a> MeshReader<'a> {
             return Err(self.source.at(place, ErrorKind::Limit(cause)));
         }
         Ok(())
+    }
+}
+
+/// Warns of textures that are read by texture coordinates which a primitive does not have.
+pub(super) fn warn_of_missing_uvs(
+    source: &Source<'_>,
+    mesh: usize,
+    primitives: &[Primitive],
+    materials: &[MaterialDesc],
+    report: &mut Report,
+) {
+    for primitive in primitives {
+        let Some(MaterialModel::Pbr(pbr)) = primitive.material.map(|m| &materials[m].model) else { continue };
+        let lacking = |set: &usize| primitive.mesh.uvs.get(*set).is_none_or(Vec::is_empty);
+        if let Some(set) = pbr.textures().map(|t| t.uv_set).find(lacking) {
+            let place = format!("/meshes/{mesh}/primitives/{}/attributes", primitive.number);
+            let message = format!("there is no TEXCOORD_{set}, by which the material reads a texture: (0, 0) is taken");
+            report.warn(source.file, place, message);
+        }
     }
 }
 

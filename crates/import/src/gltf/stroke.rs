@@ -8,13 +8,16 @@ use gltf::json::mesh::Mode;
 use super::bake::Influence;
 use crate::scene::TriangleMesh;
 
-/// How thick points and lines are drawn, in the units of their mesh; `None`: they are not.
+/// How thick points and lines are drawn, in the units of their mesh; by default they are not.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Strokes {
     /// Radius of the ball at each point.
     pub points: Option<f32>,
     /// Radius of the rod along each line.
     pub lines: Option<f32>,
+    /// Whether those without a radius are drawn thin: a 400th of the extent of all vertices of their primitive. They are
+    /// left out, with a warning, from where the file has more than 10,000 of them.
+    pub thin: bool,
 }
 
 impl Strokes {
@@ -26,6 +29,17 @@ impl Strokes {
             Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan => None,
         }
     }
+}
+
+/// Most points and ends of lines of a file that are drawn though no radius is given: each body takes a hundred times the
+/// memory of what it stands for.
+pub(super) const MOST_THIN: u64 = 10_000;
+
+/// The radius that is thin beside all of a primitive; `None` if it has no extent.
+pub(super) fn thin_radius(positions: &[Vec3]) -> Option<f32> {
+    let start = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    let (low, high) = positions.iter().fold(start, |(low, high), &p| (low.min(p), high.max(p)));
+    Some((high - low).length() / 400.0).filter(|r| r.is_normal())
 }
 
 /// Most vertices or triangles of the body of one point or line.

@@ -183,7 +183,7 @@ fn points_and_lines_have_bodies_where_that_is_asked() {
         ]}],
         "nodes": [{"mesh": 0}],
     });
-    let strokes = super::Strokes { points: Some(0.5), lines: Some(0.5) };
+    let strokes = super::Strokes { points: Some(0.5), lines: Some(0.5), thin: false };
     let read = read_with(&file, &Options { strokes, ..Options::default() }).expect("readable");
     let crate::scene::SurfaceDesc::Triangles(mesh) = &read.scene.meshes[0].geometries[0].surface else {
         panic!("no triangles")
@@ -195,4 +195,58 @@ fn points_and_lines_have_bodies_where_that_is_asked() {
     let limits = Limits { elements: 90, ..Limits::default() };
     let error = read_with(&file, &Options { strokes, limits, ..Options::default() }).expect_err("too many");
     assert!(matches!(error.kind, ErrorKind::Limit(_)), "{error}");
+}
+
+#[test]
+fn points_and_lines_without_a_radius_are_thin_and_not_too_many() {
+    let bytes = [0.0_f32, 0.0, 0.0, 300.0, 400.0, 0.0].into_iter().flat_map(f32::to_le_bytes);
+    let uri = format!("data:application/octet-stream,{}", bytes.map(|b| format!("%{b:02x}")).collect::<String>());
+    let mut file = json!({
+        "asset": {"version": "2.0"},
+        "buffers": [{"byteLength": 24, "uri": uri}],
+        "bufferViews": [{"buffer": 0, "byteLength": 24}],
+        "accessors": [{"type": "VEC3", "componentType": 5126, "count": 2, "bufferView": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "mode": 0}]}],
+        "nodes": [{"mesh": 0}],
+    });
+    let strokes = super::Strokes { thin: true, ..super::Strokes::default() };
+    let options = Options { strokes, ..Options::default() };
+    let read = read_with(&file, &options).expect("readable");
+    let crate::scene::SurfaceDesc::Triangles(mesh) = &read.scene.meshes[0].geometries[0].surface else {
+        panic!("no triangles")
+    };
+    assert_eq!((mesh.triangles.len(), mesh.positions[0]), (2 * 32, glam::Vec3::new(500.0 / 400.0, 0.0, 0.0)));
+    assert_eq!(read.report.warnings, []);
+    // The same two points, 5,001 times.
+    let primitive = file["meshes"][0]["primitives"][0].clone();
+    file["meshes"][0]["primitives"] = vec![primitive; 5_001].into();
+    let read = read_with(&file, &options).expect("readable");
+    assert_eq!(read.scene.meshes[0].geometries.len(), 5_000);
+    let said: Vec<_> = read.report.warnings.iter().map(|w| (w.place.as_str(), w.message.as_str())).collect();
+    assert_eq!(
+        said,
+        [("/meshes/0/primitives/5000", "2 points or ends of lines are too many to be drawn unless a radius is given")]
+    );
+}
+
+#[test]
+fn textures_without_their_coordinates_are_told_of() {
+    let file = json!({
+        "asset": {"version": "2.0"},
+        "images": [{"uri": "a.png"}],
+        "textures": [{"source": 0}],
+        "materials": [{"emissiveTexture": {"index": 0, "texCoord": 1}}],
+        "accessors": [
+            {"type": "VEC3", "componentType": 5126, "count": 3},
+            {"type": "VEC2", "componentType": 5126, "count": 3},
+        ],
+        "meshes": [
+            {"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "material": 0}]},
+            {"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1, "TEXCOORD_1": 1}, "material": 0}]},
+        ],
+    });
+    let report = read_with(&file, &Options::default()).expect("readable").report;
+    let told: Vec<_> = report.warnings.iter().filter(|w| w.message.contains("TEXCOORD_1")).collect();
+    assert_eq!(told.len(), 1, "{:?}", report.warnings);
+    assert_eq!(told[0].place, "/meshes/0/primitives/0/attributes");
 }
