@@ -313,6 +313,14 @@ impl Stage {
         if let Some(view) = view.filter(|_| dim) {
             stage.lights.ambient = survey::even_light(&stage, &view, options.aspect);
         }
+        if let (Some(view), Some(_)) = (view, headlight) {
+            let enough = survey::share_of_headlight(&stage, &view, options.aspect);
+            for light in &mut stage.lights.punctual {
+                if let PunctualLight::Headlight { share, .. } = light {
+                    *share = enough;
+                }
+            }
+        }
         if effects.contains(EffectSet::MOTION) && motion::count(stage.scene()) > 0 {
             let steps = options.motion_steps.max(1);
             let moments = (0..steps).map(|k| stage.at((f64::from(k) + 0.5) / f64::from(steps), studio));

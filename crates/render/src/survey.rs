@@ -8,6 +8,7 @@ use glam::{DVec3, Vec3};
 
 use crate::camera::Camera;
 use crate::camera::Cone;
+use crate::integrator::aov::First;
 use crate::integrator::whitted::{Limits, Seen};
 use crate::integrator::{ROUGHEST_FOLLOWED, Tracer};
 use crate::kernel::Full;
@@ -179,7 +180,8 @@ pub(crate) struct Headlight {
 
 impl Headlight {
     pub(crate) fn light(&self) -> PunctualLight {
-        PunctualLight::Headlight { position: self.position, irradiance: 2.6, distance: self.distance }
+        let Self { position, distance } = *self;
+        PunctualLight::Headlight { position, irradiance: 2.6, distance, share: 1.0 }
     }
 }
 
@@ -235,26 +237,50 @@ pub(crate) fn view(accel: &firsthit_accel::Scene, camera: &Camera, aspect: f64) 
     Some(View { distance, open, indoors: 2 * seen >= all && open < INDOORS })
 }
 
+/// Which share of a light at the camera is enough where the light that surfaces send to each other is followed. In a
+/// closed room whose surfaces reflect the share `r`, each sends on `r` of what it gets: `1 + r + r^2 + ...` of the light.
+pub(crate) fn share_of_headlight(stage: &Stage, view: &View, aspect: f64) -> f32 {
+    /// Of the whitest room.
+    const LEAST: f32 = 0.15;
+    let mut sum = 0.0;
+    let seen = first_sights(stage, aspect, |first, _| {
+        let albedo = luminance(first.albedo);
+        sum += if albedo.is_finite() { albedo.clamp(0.0, 1.0) } else { 0.0 };
+    });
+    let reflected = if seen > 0 { (1.0 - view.open) as f32 * sum / seen as f32 } else { 0.0 };
+    (1.0 - reflected).max(LEAST)
+}
+
 /// Even light for a stage with lights of its own, in place of the light that surfaces send to each other: the mean
 /// radiance of what is seen, for the share of directions that is not open (as the ambient term of progressive
 /// radiosity, Cohen et al. 1988, by a guess instead of a sum).
 pub(crate) fn even_light(stage: &Stage, view: &View, aspect: f64) -> Vec3 {
-    let clip = ClipRegion::default();
-    let mut tracer = Tracer::<Full>::new(stage, &clip);
-    let limits = Limits { bounces: 1, follow: LobeKind::empty(), mirrors: false };
-    let cone = Cone { width: 0.0, spread: 0.0 };
     let (mut sum, mut seen) = (0.0, 0);
-    for (pixel, ray) in looks(&stage.camera, aspect) {
-        let sampler = PixelSampler::new(0, pixel, 0);
-        let Seen { color, first: Some(_), .. } = tracer.radiance(ray, cone, [0.5; 2], sampler, limits) else {
-            continue;
-        };
+    first_sights(stage, aspect, |_, color| {
         let light = luminance(color);
         if light.is_finite() {
             // What glows or glares must not count for everything.
             sum += light.min(1.0);
             seen += 1;
         }
-    }
+    });
     Vec3::splat(if seen > 0 { (1.0 - view.open) as f32 * sum / seen as f32 } else { 0.0 })
+}
+
+/// Tells of the surfaces that a few rays of the camera see first, and of their radiance by direct light; how many there
+/// are.
+fn first_sights(stage: &Stage, aspect: f64, mut tell: impl FnMut(&First, Vec3)) -> u32 {
+    let clip = ClipRegion::default();
+    let mut tracer = Tracer::<Full>::new(stage, &clip);
+    let limits = Limits { bounces: 1, follow: LobeKind::empty(), mirrors: false };
+    let cone = Cone { width: 0.0, spread: 0.0 };
+    let mut seen = 0;
+    for (pixel, ray) in looks(&stage.camera, aspect) {
+        let sampler = PixelSampler::new(0, pixel, 0);
+        if let Seen { color, first: Some(first), .. } = tracer.radiance(ray, cone, [0.5; 2], sampler, limits) {
+            tell(&first, color);
+            seen += 1;
+        }
+    }
+    seen
 }

@@ -9,8 +9,8 @@ use firsthit_import::SceneDesc;
 use firsthit_import::scene::{AlphaMode, LightKind, MaterialModel};
 use firsthit_render::sampler::SamplerChoice;
 use firsthit_render::{
-    Aov, Checkpoint, Crop, EffectOverrides, EffectSet, IntegratorChoice, Monitor, RayKind, RenderOptions, Stage,
-    StageOptions, render, render_from,
+    Aov, Checkpoint, Crop, EffectOverrides, EffectSet, EnvironmentChoice, IntegratorChoice, Monitor, RayKind,
+    RenderOptions, Stage, StageOptions, render, render_from,
 };
 use glam::{DVec3, Vec3, Vec4};
 
@@ -39,6 +39,25 @@ fn closed_box(albedo: f32, radiance: f32) -> SceneDesc {
         }
     }
     scene
+}
+
+/// A closed room without lights is lit from the camera: light that goes round in it must not wash it out.
+#[test]
+fn rooms_lit_from_the_camera_are_as_bright_as_by_direct_light() {
+    for albedo in [0.2, 0.5, 0.8] {
+        let scene = closed_box(albedo, 0.0);
+        let mut setup = StageOptions { environment: EnvironmentChoice::Studio, ..StageOptions::default() };
+        let eye = DVec3::new(-0.7, 0.2, 0.1);
+        (setup.camera_changes.position, setup.camera_changes.focal_point) = (Some(eye), Some(DVec3::ZERO));
+        let mean = |integrator| {
+            let options = RenderOptions { width: 16, height: 9, spp: 32, integrator, ..RenderOptions::default() };
+            let color = common::render_scene(&scene, &setup, &options).film.color();
+            color.pixels.iter().map(|p| f64::from(p[1])).sum::<f64>() / color.pixels.len() as f64
+        };
+        // Whitted's method has a guess of even light in place of what walls send to each other.
+        let (path, direct) = (mean(IntegratorChoice::Path), mean(IntegratorChoice::Whitted));
+        assert!((0.5..1.5).contains(&(path / direct)), "albedo {albedo}: {path} and {direct}");
+    }
 }
 
 #[test]

@@ -18,7 +18,7 @@ pub(crate) struct First {
     depth: f32,
     normal: Vec3,
     geometric: Vec3,
-    albedo: Vec3,
+    pub(crate) albedo: Vec3,
     uv: Vec2,
     parameters: Vec2,
     instance: u32,

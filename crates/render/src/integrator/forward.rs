@@ -415,7 +415,7 @@ impl Walk {
     fn arriving(&self, stage: &Stage, at: DVec3) -> Option<Vec3> {
         let Some(Power::OfPunctual { light, per_density }) = self.unknown else { return Some(self.light) };
         let light = stage.lights.punctual.get(light)?;
-        let sample = light.sample(at, [0.5; 2])?;
+        let sample = light.sample_followed(at, [0.5; 2])?;
         let LightEnd::At(place) = sample.end else { return None };
         Some(self.light * sample.radiance * ((place - at).length_squared() as f32 * per_density))
     }

@@ -404,7 +404,7 @@ impl<K: Kernel> Tracer<'_, K> {
         let (stage, lights) = (self.stage, &self.stage.lights);
         match chosen {
             Chosen::Punctual(i) => {
-                let sample = lights.punctual[i].sample(from, u);
+                let sample = lights.punctual[i].sample_followed(from, u);
                 (sample.map(|s| s.chosen_with(probability)), RayKind::ShadowPunctual)
             }
             Chosen::Shape(i) => {

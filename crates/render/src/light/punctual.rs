@@ -18,7 +18,8 @@ pub(crate) enum PunctualLight {
     /// From a direction.
     Directional { towards: Vec3, irradiance: Vec3, one_minus_cos: f32 },
     /// At the camera: falls off more gently than a real light, so that near and far are both seen.
-    Headlight { position: DVec3, irradiance: f32, distance: f64 },
+    /// Where the light that surfaces send to each other is followed, only a `share` is sent.
+    Headlight { position: DVec3, irradiance: f32, distance: f64, share: f32 },
 }
 
 /// Where a spot light shines.
@@ -150,6 +151,15 @@ impl PunctualLight {
         }
     }
 
+    /// As [`PunctualLight::sample`], where the light that surfaces send to each other is followed.
+    pub(crate) fn sample_followed(&self, point: DVec3, u: [f32; 2]) -> Option<LightSample> {
+        let sample = self.sample(point, u)?;
+        match self {
+            Self::Headlight { share, .. } => Some(LightSample { radiance: sample.radiance * *share, ..sample }),
+            Self::Point { .. } | Self::Directional { .. } => Some(sample),
+        }
+    }
+
     /// Light that arrives at a point. `radiance` is the irradiance on a surface that faces the light.
     pub(crate) fn sample(&self, point: DVec3, u: [f32; 2]) -> Option<LightSample> {
         tally::sample(EffectSet::PUNCTUAL_LIGHTS);
@@ -179,7 +189,7 @@ impl PunctualLight {
                 };
                 (direction, *irradiance, LightEnd::Infinity)
             }
-            Self::Headlight { position, irradiance, distance } => {
+            Self::Headlight { position, irradiance, distance, .. } => {
                 let to = *position - point;
                 let d = to.length();
                 let x = d / distance;
