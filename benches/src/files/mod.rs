@@ -168,7 +168,7 @@ pub fn render(program: &Path, folder: &Path, file: &str, into: &Path) -> io::Res
     let path = into.join(file.replace('/', "__") + ".png");
     let mut command = Command::new(program);
     command.arg("render").arg(folder.join(file)).arg("-o").arg(&path);
-    command.args(["--resolution", "256x256", "--spp", "16", "--time-limit", "6s", "--threads", "1"]);
+    command.args(["--resolution", "256x256", "--spp", "16", "--time-limit", "20s", "--threads", "1"]);
     let ended = child::run(command.args(["--no-config", "--no-progress"]), LIMIT)?;
     Ok(Picture {
         path,

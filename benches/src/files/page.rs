@@ -148,7 +148,7 @@ fn pictures(rows: &[Row]) -> String {
     }
     let made = pictures.iter().filter(|(_, p)| p.end == End::Loaded).count();
     let mut text = format!(
-        "\n## Pictures\nEvery file that loads is rendered: 256 x 256, 16 samples, at most 6 seconds, one thread. {made} pictures of \
+        "\n## Pictures\nEvery file that loads is rendered: 256 x 256, 16 samples, at most 20 seconds, one thread. {made} pictures of \
          {} files.\n",
         pictures.len()
     );
