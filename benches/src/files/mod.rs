@@ -142,7 +142,10 @@ pub fn load(program: &Path, folder: &Path, file: &str, known: Known) -> io::Resu
         picture: None,
     };
     let Ok(metadata) = fs::metadata(&path) else { return Ok(row) };
-    let ended = child::run(Command::new(program).arg("inspect").arg(&path).arg("--json"), LIMIT)?;
+    let mut command = Command::new(program);
+    // As many threads as the page says.
+    command.env("RAYON_NUM_THREADS", "1");
+    let ended = child::run(command.arg("inspect").arg(&path).arg("--json"), LIMIT)?;
     row.end = End::of(&ended);
     row.error = first_line(&ended.stderr, folder, file);
     row.bytes = metadata.len();

@@ -126,9 +126,9 @@ fn verdicts(rows: &[Row]) -> String {
     text
 }
 
-/// The end of a path, which is enough to find it in the table below.
+/// The end of a path, its folder and its name, which is enough to find it in the table below.
 fn short(file: &str) -> &str {
-    file.rsplit_once('/').map_or(file, |(_, name)| name)
+    file.rmatch_indices('/').nth(1).map_or(file, |(at, _)| &file[at + 1..])
 }
 
 fn refusals(rows: &[Row]) -> String {
