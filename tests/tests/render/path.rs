@@ -1,6 +1,7 @@
 //! Path tracing against closed forms, against Whitted's method where both know the answer, and against itself.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 use std::time::Duration;
 
 use firsthit_accel::{BuildOptions, SceneBuilder};
@@ -9,8 +10,8 @@ use firsthit_import::SceneDesc;
 use firsthit_import::scene::{AlphaMode, LightKind, MaterialModel};
 use firsthit_render::sampler::SamplerChoice;
 use firsthit_render::{
-    Aov, Checkpoint, Crop, EffectOverrides, EffectSet, EnvironmentChoice, IntegratorChoice, Monitor, RayKind,
-    RenderOptions, Stage, StageOptions, render, render_from,
+    Aov, Checkpoint, Crop, EffectOverrides, EffectSet, IntegratorChoice, Monitor, RayKind, RenderOptions, Stage,
+    StageOptions, render, render_from,
 };
 use glam::{DVec3, Vec3, Vec4};
 
@@ -45,13 +46,14 @@ fn closed_box(albedo: f32, radiance: f32) -> SceneDesc {
 #[test]
 fn rooms_lit_from_the_camera_are_as_bright_as_by_direct_light() {
     for albedo in [0.2, 0.5, 0.8] {
-        let scene = closed_box(albedo, 0.0);
-        let mut setup = StageOptions { environment: EnvironmentChoice::Studio, ..StageOptions::default() };
+        let scene = Arc::new(closed_box(albedo, 0.0));
+        let mut setup = StageOptions::default();
         let eye = DVec3::new(-0.7, 0.2, 0.1);
         (setup.camera_changes.position, setup.camera_changes.focal_point) = (Some(eye), Some(DVec3::ZERO));
+        let stage = Stage::new(Arc::clone(&scene), common::accel(&scene), &setup).unwrap();
         let mean = |integrator| {
             let options = RenderOptions { width: 16, height: 9, spp: 32, integrator, ..RenderOptions::default() };
-            let color = common::render_scene(&scene, &setup, &options).film.color();
+            let color = render(&stage, &options, &()).unwrap().film.color();
             color.pixels.iter().map(|p| f64::from(p[1])).sum::<f64>() / color.pixels.len() as f64
         };
         // Whitted's method has a guess of even light in place of what walls send to each other.
@@ -381,7 +383,7 @@ fn pauses_and_shares_leave_no_trace() {
             self.0.load(std::sync::atomic::Ordering::Relaxed) <= 0
         }
     }
-    let scene = std::sync::Arc::new(everything());
+    let scene = Arc::new(everything());
     let stage = common::stage(&scene, &StageOptions::default());
     let kept = |sums: &firsthit_render::Sums<'_>| {
         let mut bytes = Vec::new();
@@ -453,7 +455,7 @@ fn a_checkpoint_loses_no_more_than_the_rows_at_hand() {
             }
         }
     }
-    let scene = std::sync::Arc::new(everything());
+    let scene = Arc::new(everything());
     for precision in [Precision::Robust, Precision::Fast] {
         let build = BuildOptions { precision, ..BuildOptions::default() };
         let accel = SceneBuilder::from_desc(&scene, build).build().unwrap();
