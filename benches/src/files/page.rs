@@ -133,10 +133,12 @@ fn short(file: &str) -> &str {
 
 fn refusals(rows: &[Row]) -> String {
     let mut text = String::from(
-        "\n## What refused files are told\nAfter the file's name.\n\n| file | the validator's first error | ours |\n|---|---|---|\n",
+        "\n## What refused files are told\nAfter the file's name.\n\n| folder | file | the validator's first error | ours |\n|---|---|---|---|\n",
     );
+    let mut last = "";
     for row in rows.iter().filter(|r| r.end == End::Refused) {
-        _ = writeln!(text, "| {} | {} | {} |", row.file, row.known.first_error, cell(&row.error));
+        let (folder, name) = placed(&row.file, &mut last);
+        _ = writeln!(text, "| {folder} | {name} | {} | {} |", row.known.first_error, cell(&row.error));
     }
     text
 }
@@ -160,14 +162,15 @@ fn pictures(rows: &[Row]) -> String {
 
 fn all(rows: &[Row]) -> String {
     let mut text = String::from(
-        "\n## All files\n| file | valid | | triangles | inventory | warnings | seconds | MiB |\n|---|---|---|---|---|---|---|---|\n",
+        "\n## All files\n| folder | file | valid | | triangles | inventory | warnings | seconds | MiB |\n|---|---|---|---|---|---|---|---|---|\n",
     );
+    let mut last = "";
     for row in rows {
+        let (folder, name) = placed(&row.file, &mut last);
         let valid = row.known.valid.map_or("", |valid| if valid { "yes" } else { "no" });
         _ = writeln!(
             text,
-            "| {} | {valid} | {} | {} | {} | {} | {:.2} | {} |",
-            row.file,
+            "| {folder} | {name} | {valid} | {} | {} | {} | {} | {:.2} | {} |",
             row.end.name(),
             shown(row.triangles),
             shown(row.known.triangles),
@@ -177,6 +180,14 @@ fn all(rows: &[Row]) -> String {
         );
     }
     text
+}
+
+/// The folder of a file, where it is another than the `last` one, and its name.
+fn placed<'a>(file: &'a str, last: &mut &'a str) -> (&'a str, &'a str) {
+    let (folder, name) = file.rsplit_once('/').unwrap_or(("", file));
+    let changed = *last != folder;
+    *last = folder;
+    (if changed { folder } else { "" }, name)
 }
 
 fn shown(count: Option<u64>) -> String {
@@ -217,8 +228,9 @@ mod tests {
             "| agrees: valid and read | 1 |",
             "| agrees: broken and refused | 1 |",
             "| more lenient: broken, but read | 1 |",
-            "| b/broken.gltf | INVALID_JSON | line 1 column 2: not JSON: a \\| b |",
-            "| a/good.gltf | yes | loaded | 12 | 12 | 0 | 0.01 | 20 |",
+            "| b | broken.gltf | INVALID_JSON | line 1 column 2: not JSON: a \\| b |",
+            "| a | good.gltf | yes | loaded | 12 | 12 | 0 | 0.01 | 20 |\n| b | broken.gltf | no | refused |  | 12 |",
+            "|  | empty.gltf | no | loaded | 12 |",
         ] {
             assert!(text.contains(wanted), "{wanted} in\n{text}");
         }
