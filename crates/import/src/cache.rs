@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
-use crate::gltf::Document;
+use crate::gltf::{Document, DracoPrimitives};
 use crate::scene::ImageDesc;
 use crate::{Limits, Report};
 
@@ -20,6 +20,7 @@ struct Shelves {
     images: HashMap<PathBuf, Kept>,
     bytes: HashMap<PathBuf, Arc<Vec<u8>>>,
     documents: HashMap<PathBuf, Arc<Document>>,
+    draco: HashMap<PathBuf, Arc<DracoPrimitives>>,
 }
 
 /// The images of a file, and what there was to say of them.
@@ -62,14 +63,7 @@ impl ImageCache {
 
     /// The bytes of a file, read if they are not there yet.
     pub(crate) fn bytes<E>(&self, file: &Path, read: impl FnOnce() -> Result<Vec<u8>, E>) -> Result<Arc<Vec<u8>>, E> {
-        if let Some(bytes) = self.0.lock().ok().and_then(|all| all.bytes.get(file).cloned()) {
-            return Ok(bytes);
-        }
-        let bytes = Arc::new(read()?);
-        if let Ok(mut all) = self.0.lock() {
-            all.bytes.insert(file.to_owned(), Arc::clone(&bytes));
-        }
-        Ok(bytes)
+        self.once(file, |all| &mut all.bytes, read)
     }
 
     /// The JSON of a glTF file, parsed if it is not there yet.
@@ -78,13 +72,34 @@ impl ImageCache {
         file: &Path,
         parse: impl FnOnce() -> Result<Document, E>,
     ) -> Result<Arc<Document>, E> {
-        if let Some(document) = self.0.lock().ok().and_then(|all| all.documents.get(file).cloned()) {
-            return Ok(document);
+        self.once(file, |all| &mut all.documents, parse)
+    }
+
+    /// The compressed primitives of a glTF file, decoded if they are not there yet.
+    pub(crate) fn draco<E>(
+        &self,
+        file: &Path,
+        decode: impl FnOnce() -> Result<DracoPrimitives, E>,
+    ) -> Result<Arc<DracoPrimitives>, E> {
+        self.once(file, |all| &mut all.draco, decode)
+    }
+
+    /// What stands on a shelf, made if it is not there yet.
+    fn once<T, E>(
+        &self,
+        file: &Path,
+        shelf: fn(&mut Shelves) -> &mut HashMap<PathBuf, Arc<T>>,
+        make: impl FnOnce() -> Result<T, E>,
+    ) -> Result<Arc<T>, E> {
+        let known = self.0.lock().ok().and_then(|mut all| shelf(&mut all).get(file).cloned());
+        if let Some(known) = known {
+            return Ok(known);
         }
-        let document = Arc::new(parse()?);
+        let made = Arc::new(make()?);
+        // Poisoned by a thread that broke down: then nothing is kept.
         if let Ok(mut all) = self.0.lock() {
-            all.documents.insert(file.to_owned(), Arc::clone(&document));
+            shelf(&mut all).insert(file.to_owned(), Arc::clone(&made));
         }
-        Ok(document)
+        Ok(made)
     }
 }

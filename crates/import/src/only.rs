@@ -122,15 +122,15 @@ impl SceneDesc {
             parts.push(mesh.geometries.iter().map(|g| choice.takes([g.name.as_str()])).collect());
         }
         // A mesh that one instance shows as a whole keeps its parts, also where another is not asked for by name.
-        let mut kept = vec![false; self.meshes.len()];
+        let (mut entire, mut kept) = (whole.clone(), vec![false; self.meshes.len()]);
         self.instances.retain(|instance| {
             let named = choice.takes([instance.name.as_str()]);
-            whole[instance.mesh] |= named;
+            entire[instance.mesh] |= named;
             let some = named || whole[instance.mesh] || parts[instance.mesh].contains(&true);
             kept[instance.mesh] |= some;
             some
         });
-        for (m, mesh) in self.meshes.iter_mut().enumerate().filter(|(m, _)| kept[*m] && !whole[*m]) {
+        for (m, mesh) in self.meshes.iter_mut().enumerate().filter(|(m, _)| kept[*m] && !entire[*m]) {
             let mut wanted = parts[m].iter();
             mesh.geometries.retain(|_| wanted.next().copied().unwrap_or(false));
         }

@@ -151,7 +151,7 @@ pub fn open(path: impl AsRef<Path>, options: &Options) -> Result<Imported, Impor
 }
 
 /// As [`open`], with something to do as soon as all shapes are there and while images are still being decoded, such as
-/// building trees. The scene that it gets is whole but for its images.
+/// building trees. The scene that it gets is whole but for its images and, of OBJ, its materials.
 ///
 /// # Errors
 /// As for [`open`].
@@ -181,6 +181,7 @@ pub fn open_with<T: Send>(
         Ok(())
     };
     let imported = read_as(format, &file, options, &Inclusion::default(), &mut then)?;
+    check_memory(&imported.scene, &imported.report, &file, options)?;
     let done = result.or_else(|| meanwhile.take().map(|work| work(&imported.scene)));
     match done {
         Some(done) => Ok((imported, done)),
@@ -201,15 +202,20 @@ pub(crate) fn finish(
 ) -> Result<(), ImportError> {
     let warn = |_, name: &str, message| report.warn(file, format!("instance '{name}'"), message);
     scene.bake(&options.limits, warn).map_err(|kind| ImportError::new(file, "", kind))?;
-    // As far as they are files; bytes at hand may become what any file may.
-    let read = report.files.iter().filter_map(|file| fs::metadata(file).ok()).map(|meta| meta.len()).sum();
-    let memory = options.limits.check_memory("its meshes and images", scene.bytes(), read);
-    memory.map_err(|kind| ImportError::new(file, "", kind))?;
+    check_memory(scene, report, file, options)?;
     let mut surfaces = scene.instances.iter().flat_map(|i| &scene.meshes[i.mesh].geometries).map(|g| &g.surface);
     if !surfaces.any(|s| !matches!(s, SurfaceDesc::Triangles(mesh) if mesh.triangles.is_empty())) {
         report.warn(file, "", "has no surface: there is nothing to see");
     }
     Ok(())
+}
+
+/// Checks what a scene holds against the files that it was made of.
+fn check_memory(scene: &SceneDesc, report: &Report, file: &Path, options: &Options) -> Result<(), ImportError> {
+    // As far as they are files; bytes at hand may become what any file may.
+    let read = report.files.iter().filter_map(|file| fs::metadata(file).ok()).map(|meta| meta.len()).sum();
+    let memory = options.limits.check_memory("its meshes and images", scene.bytes(), read);
+    memory.map_err(|kind| ImportError::new(file, "", kind))
 }
 
 /// The formats that are read.
@@ -267,33 +273,31 @@ pub(crate) fn read_as(
 ) -> Result<Imported, ImportError> {
     let stages = options.stages.as_ref();
     let mut input = Input::open(file, &options.limits)?;
-    let mut imported = if format == Format::Obj && !ply::is_ply(input.start(4)?) {
+    if format == Format::Obj && !ply::is_ply(input.start(4)?) {
         // The only format that is not held as a whole: its files are long, and read from front to end.
         check_choices(format, file, options)?;
-        obj::read_input(input, file, options)?
-    } else {
-        let read = || timed(stages, Stage::Read, || input.rest());
-        let bytes = match &options.images {
-            Some(cache) => cache.bytes(file, read)?,
-            None => Arc::new(read()?),
-        };
-        if format == Format::Gltf || (format == Format::Json && is_gltf_json(&bytes)) {
-            return gltf::read_bytes(&bytes, file, options, then);
-        }
-        check_choices(format, file, options)?;
-        let mut imported = match format {
-            // Whatever it is called.
-            Format::Obj | Format::Stl if ply::is_ply(&bytes) => ply::read_bytes(&bytes, file, options),
-            Format::Ply if stl::is_ascii(&bytes) => stl::read_bytes(&bytes, file, options),
-            Format::Ply => timed(stages, Stage::Parse, || ply::read_bytes(&bytes, file, options)),
-            Format::Toml | Format::Json => toml::read_bytes(&bytes, file, options, including),
-            Format::Stl | Format::Obj | Format::Gltf => {
-                timed(stages, Stage::Parse, || stl::read_bytes(&bytes, file, options))
-            }
-        }?;
-        imported.scene.keep_only(&options.only, file)?;
-        imported
+        return obj::read_input(input, file, options, then);
+    }
+    let read = || timed(stages, Stage::Read, || input.rest());
+    let bytes = match &options.images {
+        Some(cache) => cache.bytes(file, read)?,
+        None => Arc::new(read()?),
     };
+    if format == Format::Gltf || (format == Format::Json && is_gltf_json(&bytes)) {
+        return gltf::read_bytes(&bytes, file, options, then);
+    }
+    check_choices(format, file, options)?;
+    let mut imported = match format {
+        // Whatever it is called.
+        Format::Obj | Format::Stl if ply::is_ply(&bytes) => ply::read_bytes(&bytes, file, options),
+        Format::Ply if stl::is_ascii(&bytes) => stl::read_bytes(&bytes, file, options),
+        Format::Ply => timed(stages, Stage::Parse, || ply::read_bytes(&bytes, file, options)),
+        Format::Toml | Format::Json => toml::read_bytes(&bytes, file, options, including),
+        Format::Stl | Format::Obj | Format::Gltf => {
+            timed(stages, Stage::Parse, || stl::read_bytes(&bytes, file, options))
+        }
+    }?;
+    imported.scene.keep_only(&options.only, file)?;
     then(&mut imported.scene, &mut imported.report)?;
     Ok(imported)
 }

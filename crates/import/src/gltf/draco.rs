@@ -1,6 +1,7 @@
 //! KHR_draco_mesh_compression: primitives whose attributes and indices are one compressed stream.
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::panic::catch_unwind;
 
 use draco_gltf::{
@@ -20,7 +21,7 @@ use crate::{ErrorKind, ImportError};
 const NAME: &str = "KHR_draco_mesh_compression";
 
 /// The decoded primitives of a file, by the numbers of mesh and primitive.
-pub(super) struct DracoPrimitives(BTreeMap<(usize, usize), DracoPrimitive>);
+pub(crate) struct DracoPrimitives(BTreeMap<(usize, usize), DracoPrimitive>);
 
 /// A decoded primitive: a list of triangles with some of its attributes, the others are stored plainly.
 pub(super) struct DracoPrimitive(PackedGeometry);
@@ -33,6 +34,12 @@ struct Stream<'a> {
     data: &'a [u8],
     /// Most bytes that it may become.
     most: u64,
+}
+
+impl fmt::Debug for DracoPrimitives {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_set().entries(self.0.keys()).finish()
+    }
 }
 
 impl DracoPrimitives {

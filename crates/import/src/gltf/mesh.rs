@@ -1,6 +1,8 @@
 //! Primitives of meshes: vertex attributes, indices, topologies, morph targets
 //! (glTF 2.0 specification, section 3.7.2).
 
+use std::sync::Arc;
+
 use glam::{Affine2, DVec3, Vec3, Vec4};
 use gltf::json::mesh::{Mode, Semantic};
 use gltf::json::validation::Checked;
@@ -43,7 +45,7 @@ pub(super) struct MeshReader<'a> {
     /// Points and ends of lines so far for which no radius is given.
     thin: u64,
     quantized: bool,
-    draco: DracoPrimitives,
+    draco: Arc<DracoPrimitives>,
     variant: Option<u32>,
     /// Vertices read, those of shared arrays each time.
     read: u64,
@@ -75,7 +77,11 @@ impl<'a> MeshReader<'a> {
         strokes: Strokes,
     ) -> Result<Self, ImportError> {
         let quantized = source.uses("KHR_mesh_quantization");
-        let draco = DracoPrimitives::new(source)?;
+        let decode = || DracoPrimitives::new(source);
+        let draco = match source.cache {
+            Some(cache) => cache.draco(source.file, decode)?,
+            None => Arc::new(decode()?),
+        };
         let (read, vertices, triangles, bytes, thin) = (0, 0, 0, 0, 0);
         Ok(Self { source, value, strokes, thin, quantized, draco, variant, read, vertices, triangles, bytes })
     }

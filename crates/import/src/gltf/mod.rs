@@ -66,6 +66,7 @@ use crate::timing::{Stage, timed};
 use crate::{Decode, ImportError, Imported, Options, Report, files};
 
 pub use animation::{AnimatedProperty, Kind as AnimatedKind, PROPERTIES as ANIMATED_PROPERTIES};
+pub(crate) use draco::DracoPrimitives;
 pub use extensions::{EXTENSIONS, Extension, find as find_extension};
 pub(crate) use json::Document;
 pub use stroke::Strokes;

@@ -21,7 +21,7 @@ pub(super) struct Source<'a> {
     pub(super) folder: Folder,
     pub(super) limits: &'a Limits,
     pub(super) stages: Option<&'a Stages>,
-    cache: Option<&'a ImageCache>,
+    pub(super) cache: Option<&'a ImageCache>,
     pub(super) zeros: ZeroBudget,
     /// `None`: the file gives no data (a fallback of a compressed buffer).
     buffers: Vec<Option<Cow<'a, [u8]>>>,

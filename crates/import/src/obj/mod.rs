@@ -71,10 +71,11 @@ use std::path::Path;
 use glam::DAffine3;
 
 pub(crate) use self::material::neutral;
-use self::model::{Model, Part};
+use self::model::Part;
 pub(crate) use self::text::number;
 use crate::files::{self, Folder, Input};
 use crate::only::Choice;
+use crate::open::Then;
 use crate::scene::{GeometryDesc, ImageDesc, InstanceDesc, MaterialDesc, MeshDesc, SurfaceDesc};
 use crate::timing::{Stage, timed};
 use crate::{Decode, ImportError, Imported, Options, Report, SceneDesc};
@@ -95,7 +96,7 @@ use crate::{Decode, ImportError, Imported, Options, Report, SceneDesc};
 /// [`ImportError`] with the line and what is wrong there. Libraries and images that cannot be read are only warnings.
 pub fn read(path: impl AsRef<Path>, options: &Options) -> Result<Imported, ImportError> {
     let path = path.as_ref();
-    read_input(Input::open(path, &options.limits)?, path, options)
+    read_input(Input::open(path, &options.limits)?, path, options, &mut |_, _| Ok(()))
 }
 
 /// As [`read`], of bytes at hand, not compressed. The files they name are looked for beside `path`, which need not
@@ -105,46 +106,79 @@ pub fn read(path: impl AsRef<Path>, options: &Options) -> Result<Imported, Impor
 /// As for [`read`].
 pub fn read_bytes(bytes: Vec<u8>, path: impl AsRef<Path>, options: &Options) -> Result<Imported, ImportError> {
     let path = path.as_ref();
-    read_input(Input::of_bytes(&bytes, path), path, options)
+    read_input(Input::of_bytes(&bytes, path), path, options, &mut |_, _| Ok(()))
 }
 
-/// As [`read`], of a file that is open.
-pub(crate) fn read_input(input: Input<'_>, path: &Path, options: &Options) -> Result<Imported, ImportError> {
+/// As [`read`], of a file that is open; its images are decoded while its meshes are made and `then` is done with them.
+pub(crate) fn read_input(
+    input: Input<'_>,
+    path: &Path,
+    options: &Options,
+    then: &mut Then<'_>,
+) -> Result<Imported, ImportError> {
     let mut report = Report::default();
     report.reads(path);
     let stages = options.stages.as_ref();
     let mut model = parse::parse(input, path, options, &mut report)?;
-    let mut meshes = timed(stages, Stage::Meshes, || mesh::build(&mut model, path, "line", &mut report));
+    let mut wanted = vec![true; model.parts.len()];
     if let Some(mut choice) = Choice::new(&options.only) {
-        let wanted: Vec<bool> = model.parts.iter().map(|part| choice.takes(names(part))).collect();
+        wanted = model.parts.iter().map(|part| choice.takes(names(part))).collect();
         choice.finish(path)?;
-        let (mut of_part, mut of_mesh) = (wanted.iter(), wanted.iter());
-        model.parts.retain(|_| of_part.next() == Some(&true));
-        meshes.parts.retain(|_| of_mesh.next() == Some(&true));
     }
-    let materials = Materials::load(&model, path, options, &mut report)?;
-    let name = files::stem(path);
-    report.triangles_all_scenes = meshes.parts.iter().map(|m| m.triangles.len() as u64).sum();
-    let geometries = model.parts.iter().zip(meshes.parts).map(|(part, mesh)| {
+    let parts = model.parts.iter().zip(&wanted).filter(|(_, wanted)| **wanted).map(|(part, _)| part.clone());
+    let words = Words {
+        parts: parts.collect(),
+        libraries: std::mem::take(&mut model.libraries),
+        materials: std::mem::take(&mut model.materials),
+        has_colors: !model.colors.is_empty(),
+    };
+    let mut scene = SceneDesc { name: files::stem(path), ..SceneDesc::default() };
+    let mut of_materials = Report::default();
+    let (materials, done) = rayon::join(
+        || Materials::load(&words, path, options, &mut of_materials),
+        || {
+            let mut meshes = timed(stages, Stage::Meshes, || mesh::build(&mut model, path, "line", &mut report));
+            let mut wanted = wanted.iter();
+            meshes.parts.retain(|_| wanted.next() == Some(&true));
+            report.triangles_all_scenes = meshes.parts.iter().map(|m| m.triangles.len() as u64).sum();
+            place(&mut scene, &words.parts, meshes);
+            then(&mut scene, &mut report)
+        },
+    );
+    done?;
+    let materials = materials?;
+    for geometry in scene.meshes.iter_mut().flat_map(|m| &mut m.geometries) {
+        let named = geometry.material.and_then(|part| words.parts[part].material);
+        geometry.material = named.map_or(materials.none, |m| Some(materials.of_name[m as usize]));
+    }
+    (scene.materials, scene.images) = (materials.materials, materials.images);
+    report.absorb(of_materials);
+    Ok(Imported { scene, report })
+}
+
+/// Puts the meshes into the scene. Until there are materials, the number of the part stands for each.
+fn place(scene: &mut SceneDesc, parts: &[Part], meshes: mesh::Meshes) {
+    let geometries = parts.iter().zip(meshes.parts).enumerate().map(|(number, (part, mesh))| {
         let name = match (part.object.as_str(), part.group.as_str()) {
             (object, "") => object.to_owned(),
             ("", group) => group.to_owned(),
             (object, group) => format!("{object}/{group}"),
         };
-        let material = part.material.map_or(materials.none, |m| Some(materials.of_name[m as usize]));
-        GeometryDesc { name, surface: SurfaceDesc::Triangles(mesh), material }
+        GeometryDesc { name, surface: SurfaceDesc::Triangles(mesh), material: Some(number) }
     });
-    let mesh = MeshDesc { name: name.clone(), geometries: geometries.collect() };
+    let name = scene.name.clone();
+    scene.meshes.push(MeshDesc { name: name.clone(), geometries: geometries.collect() });
     let transform = DAffine3::from_translation(meshes.origin);
-    let scene = SceneDesc {
-        instances: vec![InstanceDesc { name: name.clone(), mesh: 0, transform, moves_to: None }],
-        meshes: vec![mesh],
-        materials: materials.materials,
-        images: materials.images,
-        name,
-        ..SceneDesc::default()
-    };
-    Ok(Imported { scene, report })
+    scene.instances.push(InstanceDesc { name, mesh: 0, transform, moves_to: None });
+}
+
+/// What a model says about its materials.
+struct Words {
+    /// The parts that are wanted.
+    parts: Vec<Part>,
+    libraries: Vec<(u32, String)>,
+    materials: Vec<(u32, String)>,
+    has_colors: bool,
 }
 
 /// What a part may be asked for by: its object, its groups, both of them.
@@ -163,7 +197,7 @@ struct Materials {
 }
 
 impl Materials {
-    fn load(model: &Model, path: &Path, options: &Options, report: &mut Report) -> Result<Self, ImportError> {
+    fn load(model: &Words, path: &Path, options: &Options, report: &mut Report) -> Result<Self, ImportError> {
         let limits = &options.limits;
         let (mut materials, images, found) = match Folder::of(path, limits) {
             Ok(folder) => {
@@ -188,7 +222,7 @@ impl Materials {
                 (Vec::new(), Vec::new(), HashMap::new())
             }
         };
-        let has_colors = !model.colors.is_empty();
+        let has_colors = model.has_colors;
         let mut missing = Vec::new();
         let of_name = model.materials.iter().map(|(line, name)| {
             found.get(mtl::key(name)).copied().unwrap_or_else(|| {
