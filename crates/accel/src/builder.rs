@@ -70,8 +70,8 @@ impl SceneBuilder {
         self.instances.len() - 1
     }
 
-    /// Says to which groups an instance belongs, one bit each: [`Scene::seen_by`] asks about some of them. All instances
-    /// belong to all groups at first; one that belongs to none is met by no query.
+    /// Says to which layers an instance belongs, one bit each: [`Scene::seen_by`] asks about some of them. All instances
+    /// belong to all layers at first; one that belongs to none is met by no query.
     ///
     /// An instance that does not exist is an error of [`SceneBuilder::build`].
     pub fn set_mask(&mut self, instance: usize, mask: u32) {
@@ -114,7 +114,8 @@ impl SceneBuilder {
     }
 
     /// The same, watched: `watch` is told now and then, by any thread, which part of the work is done, from 0 to 1. If it
-    /// breaks, the build is given up (what a thread has begun it finishes: of a large mesh, up to two thirds of its work).
+    /// breaks, the build is given up (what a thread has begun it finishes: of a large mesh, up to two thirds of its work). The tree over the instances, built last, is
+    /// not counted.
     ///
     /// ```
     /// use core::ops::ControlFlow;

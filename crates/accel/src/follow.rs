@@ -15,7 +15,7 @@ use crate::{BuildError, Scene};
 impl Scene {
     /// The trees of `after`, made of these ones, which are those of `before`: meshes that are the same share theirs,
     /// what only moved is refitted, and all else is built anew, as is what refitting has made too costly (half as much
-    /// again as when it was built). Answers are those of a scene built anew.
+    /// again as when it was built). Answers are those of a scene built anew. Instances keep their masks, by their indices.
     ///
     /// ```
     /// use firsthit_accel::SceneBuilder;
@@ -59,8 +59,12 @@ impl Scene {
             after.meshes.par_iter().enumerate().map(model).collect::<Result<_, BuildError>>()?;
         let followed = Followed::of(made.iter().map(|(_, step)| *step));
         let models = made.into_iter().map(|(model, _)| model).collect();
-        let placed = after.instances.iter().map(|i| Placed::new(i.mesh, i.transform)).collect();
-        Ok((Self::place(options, models, placed, self.mask(), Arc::default())?, followed))
+        let mut placed: Vec<Placed> = after.instances.iter().map(|i| Placed::new(i.mesh, i.transform)).collect();
+        placed.iter_mut().zip(self.placed()).for_each(|(new, old)| new.mask = old.mask);
+        // Who belongs together is known by the indices.
+        let same = placed.len() == self.placed().len();
+        let groups = if same { Arc::clone(self.groups()) } else { Arc::default() };
+        Ok((Self::place(options, models, placed, self.mask(), groups)?, followed))
     }
 }
 

@@ -12,7 +12,7 @@ use crate::{BuildError, Scene, SceneBuilder};
 
 /// What a group is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Child {
+pub enum GroupMember {
     /// The mesh with this index: [`SceneBuilder::add_mesh`].
     Mesh(usize),
     /// The group with this index: [`SceneBuilder::add_group`].
@@ -22,7 +22,7 @@ pub enum Child {
 /// What is placed together.
 #[derive(Clone, Debug)]
 struct Group {
-    children: Vec<(Child, DAffine3)>,
+    children: Vec<(GroupMember, DAffine3)>,
     /// Meshes in the children up to and including each.
     ends: Vec<u64>,
 }
@@ -39,10 +39,10 @@ pub(crate) struct Groups {
 
 impl Groups {
     /// Meshes in it, however deep.
-    fn size(&self, child: Child) -> u64 {
+    fn size(&self, child: GroupMember) -> u64 {
         match child {
-            Child::Mesh(_) => 1,
-            Child::Group(g) => self.groups.get(g).and_then(|g| g.ends.last().copied()).unwrap_or(0),
+            GroupMember::Mesh(_) => 1,
+            GroupMember::Group(g) => self.groups.get(g).and_then(|g| g.ends.last().copied()).unwrap_or(0),
         }
     }
 
@@ -50,13 +50,21 @@ impl Groups {
         self.error.get_or_insert(error);
     }
 
-    /// The instances of a group, depth first.
+    /// The instances of a group, depth first. On a stack of its own: groups may be nested deeply.
     fn place(&self, group: usize, transform: DAffine3, out: &mut Vec<Placed>) {
-        let Some(group) = self.groups.get(group) else { return };
-        for (child, own) in &group.children {
+        let children = |group: usize| self.groups.get(group).map_or(&[][..], |g| &g.children).iter();
+        let mut stack = vec![(children(group), transform)];
+        while let Some((rest, transform)) = stack.last_mut() {
+            let Some((child, own)) = rest.next() else {
+                stack.pop();
+                continue;
+            };
+            let placed = *transform * *own;
             match child {
-                Child::Mesh(mesh) => out.push(Placed::new(*mesh, transform * *own)),
-                Child::Group(inner) => self.place(*inner, transform * *own, out),
+                GroupMember::Mesh(mesh) => out.push(Placed::new(*mesh, placed)),
+                // Nothing of nothing of nothing could take forever.
+                GroupMember::Group(inner) if self.size(*child) > 0 => stack.push((children(*inner), placed)),
+                GroupMember::Group(_) => {}
             }
         }
     }
@@ -78,7 +86,7 @@ impl Groups {
             let before = k.checked_sub(1).and_then(|k| ends.get(k)).copied().unwrap_or(0);
             rest -= before;
             match children.get(k) {
-                Some((Child::Group(inner), _)) => group = *inner,
+                Some((GroupMember::Group(inner), _)) => group = *inner,
                 _ => break,
             }
         }
@@ -92,23 +100,25 @@ impl SceneBuilder {
     /// [`SceneBuilder::add_instances_of`].
     ///
     /// A child that does not exist is an error of [`SceneBuilder::build`].
-    pub fn add_group(&mut self, children: impl IntoIterator<Item = (Child, DAffine3)>) -> usize {
-        let children: Vec<_> = children.into_iter().collect();
+    pub fn add_group(&mut self, children: impl IntoIterator<Item = (GroupMember, DAffine3)>) -> usize {
         let groups = self.groups_mut();
-        let group = groups.groups.len();
-        let mut ends = Vec::with_capacity(children.len());
+        let count = groups.groups.len();
+        let mut group = Group { children: Vec::new(), ends: Vec::new() };
         let mut end = 0u64;
-        for (child, _) in &children {
-            if let Child::Group(g) = child
-                && *g >= group
+        for (child, transform) in children {
+            // Only what was there before: so there are no circles.
+            if let GroupMember::Group(g) = child
+                && g >= count
             {
-                groups.fail(BuildError::NoSuchGroup { group: *g, count: group });
+                groups.fail(BuildError::NoSuchGroup { group: g, count });
+                continue;
             }
-            end = end.saturating_add(groups.size(*child));
-            ends.push(end);
+            end = end.saturating_add(groups.size(child));
+            group.children.push((child, transform));
+            group.ends.push(end);
         }
-        groups.groups.push(Group { children, ends });
-        group
+        groups.groups.push(group);
+        count
     }
 
     /// Places a group in the world: one instance for each mesh in it, depth first. The answer is their indices, which are the
@@ -117,15 +127,15 @@ impl SceneBuilder {
     /// Transforms are multiplied in `f64`, from the outside to the inside.
     ///
     /// ```
-    /// use firsthit_accel::{Child, Geometry, SceneBuilder};
+    /// use firsthit_accel::{GroupMember, Geometry, SceneBuilder};
     /// use firsthit_geometry::{Ray, shapes::Sphere};
     /// use glam::{DAffine3, DVec3};
     ///
     /// let at = |x, y, z| DAffine3::from_translation(DVec3::new(x, y, z));
     /// let mut builder = SceneBuilder::default();
     /// let ball = builder.add_mesh(vec![Geometry::Shape(Sphere::new(DVec3::ZERO, 1.0)?.into())]);
-    /// let pair = builder.add_group([(Child::Mesh(ball), at(0.0, 0.0, 0.0)), (Child::Mesh(ball), at(5.0, 0.0, 0.0))]);
-    /// let square = builder.add_group([(Child::Group(pair), at(0.0, 0.0, 0.0)), (Child::Group(pair), at(0.0, 5.0, 0.0))]);
+    /// let pair = builder.add_group([(GroupMember::Mesh(ball), at(0.0, 0.0, 0.0)), (GroupMember::Mesh(ball), at(5.0, 0.0, 0.0))]);
+    /// let square = builder.add_group([(GroupMember::Group(pair), at(0.0, 0.0, 0.0)), (GroupMember::Group(pair), at(0.0, 5.0, 0.0))]);
     /// assert_eq!(builder.add_instances_of(square, at(0.0, 0.0, -9.0)), 0..4);
     ///
     /// let scene = builder.build()?;
@@ -143,12 +153,16 @@ impl SceneBuilder {
             return first..first;
         }
         // Groups of groups grow quickly: counted before they are made.
-        let size = groups.size(Child::Group(group));
+        let size = groups.size(GroupMember::Group(group));
         if let Err(error) = limit("instances", size.saturating_add(first as u64)) {
             groups.fail(error);
             return first..first;
         }
-        let mut new = Vec::with_capacity(size as usize);
+        let mut new = Vec::new();
+        if new.try_reserve_exact(size as usize).is_err() {
+            groups.fail(BuildError::TooMany { what: "instances", count: size, limit: 0 });
+            return first..first;
+        }
         groups.place(group, transform, &mut new);
         let range = first..first + new.len();
         groups.placed.push((range.clone(), group));

@@ -39,8 +39,8 @@ impl Hit {
         [1.0 - self.u - self.v, self.u, self.v]
     }
 
-    /// What the vertices of the triangle that was hit have, at the point that was hit: normals, texture coordinates, colours, any
-    /// number or vector. `corners` are the values of its three vertices, in their order.
+    /// What the vertices of the triangle that was hit have, at the point that was hit: normals, texture coordinates, colours, anything that
+    /// can be multiplied by an `f32` and added. `corners` are the values of its three vertices, in their order.
     ///
     /// ```
     /// use firsthit_accel::{Geometry, SceneBuilder};

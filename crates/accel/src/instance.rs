@@ -15,7 +15,7 @@ use crate::model::Model;
 pub(crate) struct Placed {
     pub(crate) mesh: usize,
     pub(crate) transform: DAffine3,
-    /// Groups that it belongs to; of none it is not there for any query.
+    /// Layers that it belongs to; of none it is not there for any query.
     pub(crate) mask: u32,
 }
 
@@ -60,7 +60,8 @@ impl Instance {
 /// Boxes in the world of what is bounded in each instance: of the vertices themselves where they are not too many in
 /// all, else of the model's box. Empty for those that are not shown.
 pub(crate) fn tight_boxes(instances: &[Instance], models: &[Arc<Model>]) -> Vec<Aabb<f64>> {
-    let all: u64 = instances.iter().map(|i| models[i.model as usize].triangle_count() * 3).sum();
+    let corners = |m: &Model| m.triangle_count() * 3 + m.shape_count() * 8;
+    let all: u64 = instances.iter().filter(|i| i.shown).map(|i| corners(&models[i.model as usize])).sum();
     instances
         .par_iter()
         .map(|i| {

@@ -70,7 +70,7 @@ mod wide;
 pub use build_options::{BuildOptions, BuildQuality, Layout};
 pub use builder::{Geometry, SceneBuilder};
 pub use error::BuildError;
-pub use groups::Child;
+pub use groups::GroupMember;
 pub use guards::Guards;
 pub use hit::{Hit, HitId, SurfacePoint, TraversalCounts};
 pub use query::{ClosestPoint, Crossings, HitLists};

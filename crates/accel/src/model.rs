@@ -208,7 +208,7 @@ impl Model {
         old: Option<&Self>,
         progress: &Progress<'_>,
     ) -> Result<Self, BuildError> {
-        check(mesh, geometries)?;
+        let counts = check(mesh, geometries)?;
         let scale = common_scale(geometries, options.precision);
         let normalised = |p: Vec3| (p.as_dvec3() / scale).as_vec3();
 
@@ -252,11 +252,11 @@ impl Model {
                     first += indices.len() as u32;
                 }
                 Geometry::Shape(_) | Geometry::User(_) => {
-                    let count = count(geometry);
+                    let count = counts[g as usize];
                     model.places.push(Places::Shapes(model.shapes.len() as u32, count));
                     for primitive in 0..count {
                         let shape = match geometry {
-                            Geometry::Shape(shape) => OtherSurface::Shape(shape.clone()),
+                            Geometry::Shape(shape) => OtherSurface::Shape(Box::new(shape.clone())),
                             Geometry::User(user) => OtherSurface::User(Arc::clone(user), primitive),
                             Geometry::Triangles { .. } => continue,
                         };
@@ -429,6 +429,10 @@ impl Model {
     }
     pub(crate) fn has_shapes(&self) -> bool {
         !self.shapes.is_empty()
+    }
+    /// How many shapes there are, and primitives of the user's own.
+    pub(crate) fn shape_count(&self) -> u64 {
+        self.shapes.len() as u64
     }
     pub(crate) fn has_unbounded(&self) -> bool {
         !self.unbounded.is_empty()
@@ -910,22 +914,27 @@ fn count(geometry: &Geometry) -> u32 {
 }
 
 /// Everything finite, in range and countable.
-fn check(mesh: usize, geometries: &[Geometry]) -> Result<(), BuildError> {
-    let mut primitives = 0u64;
-    for (geometry, g) in geometries.iter().enumerate() {
+/// How many primitives of each are no triangles: what is the user's own is asked once.
+fn check(mesh: usize, geometries: &[Geometry]) -> Result<Vec<u32>, BuildError> {
+    let counts: Vec<u32> = geometries.iter().map(count).collect();
+    let of = |(g, &other): (&Geometry, &u32)| match g {
+        Geometry::Triangles { triangles, .. } => triangles.len() as u64,
+        _ => other.into(),
+    };
+    limit("primitives of a mesh", geometries.iter().zip(&counts).map(of).sum())?;
+    limit("geometries of a mesh", geometries.len() as u64)?;
+    for (geometry, (g, &other)) in geometries.iter().zip(&counts).enumerate() {
         let Geometry::Triangles { positions, triangles } = g else {
-            primitives += u64::from(count(g));
             let unusable = |i: &u32| {
                 let Geometry::User(user) = g else { return false };
                 let bounds = user.bounds(*i);
                 bounds.is_empty() || bounds.min.is_nan() || bounds.max.is_nan()
             };
-            if let Some(primitive) = (0..count(g)).find(unusable) {
+            if let Some(primitive) = (0..other).find(unusable) {
                 return Err(BuildError::UnusableBounds { mesh, geometry, primitive });
             }
             continue;
         };
-        primitives += triangles.len() as u64;
         if let Some(vertex) = positions.iter().position(|p| !p.is_finite()) {
             return Err(BuildError::NotFinite { mesh, geometry, vertex });
         }
@@ -936,8 +945,7 @@ fn check(mesh: usize, geometries: &[Geometry]) -> Result<(), BuildError> {
             }
         }
     }
-    limit("primitives of a mesh", primitives)?;
-    limit("geometries of a mesh", geometries.len() as u64)
+    Ok(counts)
 }
 
 /// Trees of obvhs have `2 n - 1` nodes, counted in 32 bits.

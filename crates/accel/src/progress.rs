@@ -35,8 +35,8 @@ impl<'a> Progress<'a> {
         let Some(watch) = self.watch else { return Ok(()) };
         let new = size(mesh) * steps;
         let done = self.done.fetch_add(new, Ordering::Relaxed) + new;
-        let goes_on =
-            !self.cancelled.load(Ordering::Relaxed) && watch(done as f64 / self.total.max(1) as f64).is_continue();
+        let goes_on = !self.cancelled.load(Ordering::Relaxed)
+            && watch((done as f64 / self.total.max(1) as f64).min(1.0)).is_continue();
         if goes_on {
             return Ok(());
         }

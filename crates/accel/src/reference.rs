@@ -60,7 +60,8 @@ pub fn crossings(scene: &Scene, ray: &Ray<f64>, what: Crossings) -> Vec<Hit> {
                 Surface::Shape(s) => {
                     let scale = model.scale();
                     let mut rest = Ray { origin: local.origin * scale, direction: local.direction * scale, ..local };
-                    while let Some(h) = s.shape.closest_hit(&rest) {
+                    for _ in 0..s.shape.most_hits() {
+                        let Some(h) = s.shape.closest_hit(&rest) else { break };
                         let normal = h.normal.map_or(DVec3::ZERO, |n| transform.normal(n));
                         hits.push(Hit { id, t: h.t + 0.0, u: h.u as f32, v: h.v as f32, normal_direction: normal });
                         rest.t_min = h.t.next_up();

@@ -25,7 +25,7 @@ pub struct SceneStats {
     pub stored_triangles: u64,
     /// Triangles as seen: each instance counted.
     pub instanced_triangles: u64,
-    /// Instances.
+    /// Instances, without those that are hidden or removed.
     pub instances: u64,
     /// Surface-area cost of the trees of the meshes, weighted by triangles.
     pub sah_cost: f64,
@@ -50,7 +50,7 @@ pub(crate) struct Inner {
     pub(crate) models: Vec<Arc<Model>>,
     /// Each instance, as given.
     placed: Vec<Placed>,
-    /// Instances with none of these groups are not met.
+    /// Instances of none of these layers are not met.
     mask: u32,
     /// Which instances came in groups.
     groups: Arc<Groups>,
@@ -105,13 +105,13 @@ impl Scene {
         Ok(Self::arrange(options, models, placed, instances, mask, groups))
     }
 
-    /// This scene for queries that ask about some groups of instances only: those instances that have one of these bits in
+    /// This scene for queries that ask about some layers of instances only: those instances that have one of these bits in
     /// their mask (see [`SceneBuilder::set_mask`](crate::SceneBuilder::set_mask)). To all queries the others are not there.
     /// Instances keep their indices.
     ///
     /// It shares all meshes with this scene, and may ask about what this one leaves out: only a tree over the instances is
-    /// built. Its queries take no longer than those of a scene that never had the others; where each ray has a mask of its own,
-    /// [`Scene::closest_hit_filtered`] can look at the instance.
+    /// built, and queries pay for what is in it. (Only that single instances have a shorter way is lost, where others are
+    /// hidden.) Where each ray has a mask of its own, a filter can look up the instance's: see [`Scene::closest_hit_filtered`].
     ///
     /// ```
     /// use firsthit_accel::{Geometry, SceneBuilder};
@@ -164,7 +164,8 @@ impl Scene {
         let unbounded = (0..instances.len() as u32)
             .filter(|&i| instances[i as usize].shown && models[instances[i as usize].model as usize].has_unbounded())
             .collect();
-        let round_trip = instances.iter().fold(0.0, |most: f64, i| most.max(i.transform.round_trip()));
+        let round_trip =
+            instances.iter().filter(|i| i.shown).fold(0.0, |most: f64, i| most.max(i.transform.round_trip()));
         let stats = SceneStats::default();
         let mut inner = Inner {
             options,
@@ -255,6 +256,12 @@ impl Scene {
     #[must_use]
     pub fn stats(&self) -> SceneStats {
         self.inner.stats
+    }
+
+    /// How many indices of instances there are: of hidden and removed ones too.
+    #[must_use]
+    pub fn instance_count(&self) -> usize {
+        self.inner.instances.len()
     }
 
     /// How the scene was built.
@@ -442,7 +449,7 @@ impl Inner {
                 .filter(|i| i.shown)
                 .map(|i| stored(&self.models[i.model as usize]))
                 .sum(),
-            instances: self.instances.len() as u64,
+            instances: self.instances.iter().filter(|i| i.shown).count() as u64,
             sah_cost: if weight > 0 { cost / weight as f64 } else { 0.0 },
             depth: self.above.depth() + self.models.iter().map(|m| m.depth()).max().unwrap_or(0),
             bytes: (models + self.above.bytes() + size_of_val(self.instances.as_slice())) as u64,

@@ -82,12 +82,13 @@ impl SceneUpdate {
         self.change(instance, |placed| placed.transform = transform)
     }
 
-    /// Gives an instance other groups: see [`Scene::seen_by`].
+    /// Puts an instance on other layers: see [`Scene::seen_by`].
     pub fn set_mask(&mut self, instance: usize, mask: u32) -> &mut Self {
         self.change(instance, |placed| placed.mask = mask)
     }
 
-    /// Removes an instance: no query meets it any more. The others keep their indices, and its own is not given again.
+    /// Removes an instance: no query meets it any more. The others keep their indices, and its own is not given again (some
+    /// hundred bytes are kept of it, which a scene built anew does not have).
     pub fn remove_instance(&mut self, instance: usize) -> &mut Self {
         self.set_mask(instance, 0)
     }

@@ -12,11 +12,12 @@ use glam::DVec3;
 /// Primitives that the user tests: voxels, curves, height fields, distance functions, anything with a box that a ray can be
 /// tested against. They are in the same trees as triangles, and instances place and scale them.
 ///
-/// All numbers are in the mesh's own space and in `f64`. Queries call from several threads. A panic in here ends the query
-/// that asked.
+/// All numbers are in the mesh's own space and in `f64` (`u` and `v` of a [`Hit`](crate::Hit) are rounded to `f32`). Queries call
+/// from several threads. Number and boxes must not change while a scene is built and lives. A panic in here ends the query that
+/// asked.
 ///
 /// Every query about rays meets them (at the tier `Exact` what is reported is taken for exact). Queries about points and
-/// regions do not.
+/// triangles in regions do not; those about parts tell them by their boxes.
 ///
 /// ```
 /// use std::sync::Arc;
@@ -60,7 +61,8 @@ pub trait UserPrimitives: fmt::Debug + Send + Sync {
     fn bounds(&self, primitive: u32) -> Aabb<f64>;
 
     /// The first hit in the closed interval of the ray, whose direction may have any length. A query that goes on behind a hit
-    /// asks again with a `t_min` just beyond; hits outside the interval, and those that are no numbers, are not taken.
+    /// asks again with a `t_min` just beyond, so a surface that a ray starts on should not be found there again and again (`refine`
+    /// moves starts away from it). Hits outside the interval, and those that are no finite numbers, are not taken.
     fn closest_hit(&self, primitive: u32, ray: &Ray<f64>) -> Option<SurfaceHit<f64>>;
 
     /// A hit point brought onto the surface, and how far off it may still be along the normal, the rounding of the next
@@ -79,7 +81,8 @@ pub trait UserPrimitives: fmt::Debug + Send + Sync {
 /// A primitive that is no triangle.
 #[derive(Clone, Debug)]
 pub(crate) enum OtherSurface {
-    Shape(Shape<f64>),
+    /// Boxed: there may be many of the others, which are small.
+    Shape(Box<Shape<f64>>),
     User(Arc<dyn UserPrimitives>, u32),
 }
 
@@ -89,6 +92,7 @@ impl OtherSurface {
         match self {
             // No ray meets one of the shapes more often than this.
             Self::Shape(_) => 16,
+            Self::User(..) if self.is_flat() => 1,
             Self::User(..) => 1 << 16,
         }
     }
@@ -105,7 +109,11 @@ impl Primitive<f64> for OtherSurface {
     fn closest_hit(&self, ray: &Ray<f64>) -> Option<SurfaceHit<f64>> {
         match self {
             Self::Shape(shape) => shape.closest_hit(ray),
-            Self::User(user, primitive) => user.closest_hit(*primitive, ray).filter(|hit| ray.contains(hit.t)),
+            // Behind the last hit of an interval there is nothing to ask about.
+            Self::User(user, primitive) if ray.t_min <= ray.t_max => {
+                user.closest_hit(*primitive, ray).filter(|hit| hit.t.is_finite() && ray.contains(hit.t))
+            }
+            Self::User(..) => None,
         }
     }
 
@@ -130,6 +138,14 @@ impl Primitive<f64> for OtherSurface {
             rest.t_min = t.next_up();
         }
         false
+    }
+
+    fn exact_root(&self, ray: &Ray<f64>, t: f64) -> Option<Root> {
+        match self {
+            Self::Shape(shape) => shape.exact_root(ray, t),
+            // What was reported is what it is.
+            Self::User(..) => Some(Root::from(t)),
+        }
     }
 
     fn refine(&self, point: DVec3, normal: Option<DVec3>) -> (DVec3, f64) {

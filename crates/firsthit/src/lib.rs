@@ -55,7 +55,7 @@ pub use firsthit_render as render;
 pub use glam;
 
 pub use firsthit_accel::{
-    BodyHit, BuildOptions, Child, ClosestPoint, Crossings, CurveSegment, Geometry, Hit, HitId, Part, Scene,
+    BodyHit, BuildOptions, ClosestPoint, Crossings, CurveSegment, Geometry, GroupMember, Hit, HitId, Part, Scene,
     SceneBuilder, SceneUpdate, Separation, SignMethod, Solid, SphereHit, SurfacePoint, View, VisitedTriangle, Visitor,
 };
 pub use firsthit_geometry::{Aabb, Precision, Ray, Shape};

@@ -45,7 +45,7 @@ fn mesh_of(scene: &Scene) -> PyResult<&Mesh> {
 }
 
 fn finish(py: Python<'_>, scene: &Scene, mut update: SceneUpdate, mesh: Mesh, threads: usize) -> PyResult<Scene> {
-    let before = scene.trees().stats().instances as usize;
+    let before = scene.trees().instance_count();
     for (i, (transform, mask)) in mesh.placed().enumerate() {
         let i = if i < before { i } else { update.add_instance(0, transform) };
         update.set_transform(i, transform).set_mask(i, mask);

@@ -15,7 +15,7 @@ pub(crate) struct Mesh {
     pub(crate) positions: Vec<Vec3>,
     pub(crate) triangles: Vec<[u32; 3]>,
     pub(crate) origin: DVec3,
-    /// Where it is seen, and by which groups.
+    /// Where it is, and on which layers.
     pub(crate) places: Vec<(DAffine3, u32)>,
 }
 
@@ -62,10 +62,14 @@ impl Mesh {
         masks: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         if let Some(transforms) = transforms {
-            self.places = matrices(transforms)?.into_iter().map(|m| (m, u32::MAX)).collect();
+            // Masks stay, by index.
+            let old = self.places.iter().map(|(_, mask)| *mask).chain(core::iter::repeat(u32::MAX));
+            self.places = matrices(transforms)?.into_iter().zip(old).collect();
         }
         let Some(masks) = masks else { return Ok(()) };
-        let masks: Vec<u32> = masks.extract()?;
+        let masks: Vec<u32> = masks
+            .extract()
+            .map_err(|e| error::value(format_args!("masks: numbers from 0 to 2^32 - 1 are needed ({e})")))?;
         if masks.len() != self.places.len() {
             let (masks, places) = (masks.len(), self.places.len());
             return Err(error::value(format_args!("{masks} masks for {places} instances")));
@@ -96,15 +100,15 @@ impl Mesh {
         builder.build()
     }
 
-    /// The same as a scene that can be rendered, of the default material.
-    pub(crate) fn desc(&self) -> SceneDesc {
+    /// What of it these layers see, as a scene that can be rendered, of the default material.
+    pub(crate) fn desc(&self, mask: u32) -> SceneDesc {
         let (positions, triangles) = (self.positions.clone(), self.triangles.clone());
         let surface = SurfaceDesc::Triangles(TriangleMesh { positions, triangles, ..TriangleMesh::default() });
         let instance = |transform| InstanceDesc { name: String::new(), mesh: 0, transform, moves_to: None };
         let geometry = GeometryDesc { name: String::new(), surface, material: None };
         SceneDesc {
             meshes: vec![MeshDesc { name: String::new(), geometries: vec![geometry] }],
-            instances: self.placed().filter(|(_, mask)| *mask != 0).map(|(m, _)| instance(m)).collect(),
+            instances: self.placed().filter(|(_, own)| own & mask != 0).map(|(m, _)| instance(m)).collect(),
             ..SceneDesc::default()
         }
     }

@@ -61,10 +61,10 @@ pub fn render<'py>(
     linear: bool,
     threads: usize,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let (source, precision) = match scene.cast::<Scene>() {
-        Ok(scene) => (scene.get().source.clone(), scene.get().options().precision),
+    let (source, mask, precision) = match scene.cast::<Scene>() {
+        Ok(scene) => (scene.get().source.clone(), scene.get().mask, scene.get().options().precision),
         Err(_) => match scene.extract::<PathBuf>() {
-            Ok(path) => (Source::File { path, up: None, variant: None }, Precision::default()),
+            Ok(path) => (Source::File { path, up: None, variant: None }, u32::MAX, Precision::default()),
             Err(_) => return Err(PyTypeError::new_err("a Scene or the path of a model is needed")),
         },
     };
@@ -96,7 +96,7 @@ pub fn render<'py>(
 
     let pool = pool(threads)?;
     let work = || {
-        let (desc, _) = source.read()?;
+        let (desc, _) = source.read(mask)?;
         let build = BuildOptions { precision, ..BuildOptions::default() };
         let trees = SceneBuilder::from_desc(&desc, build).build().map_err(error::value)?;
         let stage = Stage::new(Arc::new(desc), trees, &stage_options).map_err(error::value)?;

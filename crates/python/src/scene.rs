@@ -40,8 +40,8 @@ pub struct Scene {
     scene: firsthit_accel::Scene,
     pub(crate) source: Source,
     warnings: Vec<String>,
-    /// Only instances of these groups are met.
-    mask: u32,
+    /// Only instances of these layers are met.
+    pub(crate) mask: u32,
     /// By how inside is told from outside; made when it is first asked about.
     pub(crate) solids: Mutex<Vec<(Option<SignMethod>, Arc<Solid>)>>,
 }
@@ -76,9 +76,9 @@ fn quality_name(quality: BuildQuality) -> &'static str {
 
 impl Source {
     /// Reads the file, with what could be read only in part; an array has all in it.
-    pub(crate) fn read(&self) -> PyResult<(firsthit_import::SceneDesc, Vec<String>)> {
+    pub(crate) fn read(&self, mask: u32) -> PyResult<(firsthit_import::SceneDesc, Vec<String>)> {
         match self {
-            Self::Arrays(mesh) => Ok((mesh.desc(), Vec::new())),
+            Self::Arrays(mesh) => Ok((mesh.desc(mask), Vec::new())),
             Self::File { path, up, variant } => {
                 let up = up.as_deref().map(str::parse::<UpAxis>).transpose().map_err(error::value)?;
                 let options = Options {
@@ -87,8 +87,12 @@ impl Source {
                     decode: firsthit_import::Decode::Seen,
                     ..Options::default()
                 };
-                let Imported { scene, report } =
+                let Imported { mut scene, report } =
                     firsthit_import::open(path, &options).map_err(|e| error::import(&e))?;
+                // All its instances are on all layers.
+                if mask == 0 {
+                    scene.instances.clear();
+                }
                 Ok((scene, report.warnings.iter().map(ToString::to_string).collect()))
             }
         }
@@ -112,7 +116,7 @@ impl Scene {
         Self { scene, source, warnings: self.warnings.clone(), mask: self.mask, solids: Mutex::default() }
     }
 
-    /// With instances of these groups only.
+    /// With instances of these layers only.
     fn masked(&self, mask: u32) -> Self {
         Self { mask, ..self.of_trees(self.scene.seen_by(mask), self.source.clone()) }
     }
@@ -121,7 +125,7 @@ impl Scene {
         let pool = pool(threads)?;
         let (scene, warnings) = py.detach(|| {
             pool.install(|| {
-                let (desc, warnings) = source.read()?;
+                let (desc, warnings) = source.read(u32::MAX)?;
                 let scene = SceneBuilder::from_desc(&desc, options).build().map_err(error::value)?;
                 PyResult::Ok((scene, warnings))
             })
@@ -227,8 +231,8 @@ impl Scene {
         change::with_transforms(py, self, transforms, masks, threads)
     }
 
-    fn seen_by(&self, mask: u32) -> Self {
-        self.masked(mask)
+    fn seen_by(&self, py: Python<'_>, mask: u32) -> Self {
+        py.detach(|| self.masked(mask))
     }
 
     #[pyo3(signature = (rays, directions=None, *, t_min=None, t_max=None, threads=0))]

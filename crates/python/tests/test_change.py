@@ -66,6 +66,16 @@ def test_masks_choose_instances():
     assert [scene.seen_by(mask).closest_hit(DOWN).t_hit for mask in (1, 2, 3, 4)] == [10, 7, 7, np.inf]
     assert scene.seen_by(1).closest_hit(DOWN).instance_ids == 0
     assert scene.seen_by(1).with_transforms(moved([0, 0, 1], [0, 0, 2]), masks=[2, 3]).closest_hit(DOWN).t_hit == 8
+    # They stay with the instances.
+    assert scene.seen_by(1).with_transforms(moved([0, 0, 1], [0, 0, 2])).closest_hit(DOWN).t_hit == 9
+    assert scene.with_transforms(moved([0, 0, 1], [0, 0, 2], [0, 0, 4])).seen_by(1).closest_hit(DOWN).t_hit == 6
+
+
+def test_pictures_show_what_the_mask_sees():
+    camera = dict(width=8, height=8, samples=1, position=(0.5, 0.5, 9), focal_point=(0.5, 0.5, 0), view_up=(0, 1, 0), transparent=True)
+    scene = firsthit.Scene(SQUARE, TRIANGLES, transforms=moved([0, 0, 0], [9, 0, 0]), masks=[1, 2])
+    alpha = [firsthit.render(scene.seen_by(mask), **camera)[4, 4, 3] for mask in (3, 1, 2)]
+    assert alpha == [255, 255, 0]
 
 
 @pytest.mark.parametrize("mask", [1, 3])
@@ -86,6 +96,7 @@ def test_what_does_not_fit_is_an_error():
         (lambda: scene.with_transforms(np.diag([1, 1, 0, 1])), "instance 0"),
         (lambda: scene.with_transforms(moved([np.nan, 0, 0])), "instance 0"),
         (lambda: scene.with_transforms(np.eye(4), masks=[1, 2]), "2 masks for 1 instances"),
+        (lambda: scene.with_transforms(np.eye(4), masks=[-1]), "numbers from 0"),
     ]:
         with pytest.raises(ValueError, match=words):
             change()

@@ -4,8 +4,8 @@ use core::ops::ControlFlow;
 use std::sync::Mutex;
 
 use firsthit_accel::{
-    BuildError, BuildOptions, Child, ClosestPoint, Crossings, Geometry, Hit, Layout, Scene, SceneBuilder, SignMethod,
-    Solid,
+    BuildError, BuildOptions, ClosestPoint, Crossings, Geometry, GroupMember, Hit, Layout, Scene, SceneBuilder,
+    SignMethod, Solid,
 };
 use firsthit_geometry::overlap::Sphere;
 use firsthit_geometry::{Precision, Ray, shapes};
@@ -68,11 +68,18 @@ fn agree(scene: &Scene, (other, ids): &(Scene, Vec<u32>), ends: &[(DVec3, DVec3)
         let all: Vec<Hit> = other.all_hits(ray, Crossings::Triangles).into_iter().map(named).collect();
         prop_assert_eq!(scene.all_hits(ray, Crossings::Triangles), all);
         prop_assert_eq!(scene.closest_point(ray.origin), other.closest_point(ray.origin).map(near));
+        prop_assert_eq!(scene.count_hits(ray, Crossings::Surfaces), other.count_hits(ray, Crossings::Surfaces));
+        let first: Vec<Hit> = other.first_k_hits(ray, 2, Crossings::Triangles).into_iter().map(named).collect();
+        prop_assert_eq!(scene.first_k_hits(ray, 2, Crossings::Triangles), first);
+        let few: Vec<_> = other.nearest_k(ray.origin, 3, f64::INFINITY).into_iter().map(near).collect();
+        prop_assert_eq!(scene.nearest_k(ray.origin, 3, f64::INFINITY), few);
+        prop_assert_eq!(scene.cast_sphere(ray, 0.1).map(|h| h.t), other.cast_sphere(ray, 0.1).map(|h| h.t));
         let sphere = Sphere { center: ray.origin, radius: bounds.extent().length().min(1e300) * 0.2 };
         prop_assert_eq!(scene.overlapping(&sphere).len(), other.overlapping(&sphere).len());
     }
     let of = |scene| Solid::with_method(scene, SignMethod::Winding);
     prop_assert_eq!(of(scene).boundary_edges() > 0, of(other).boundary_edges() > 0);
+    prop_assert_eq!(scene.stats().instances, other.stats().instances);
     Ok(())
 }
 
@@ -186,6 +193,13 @@ proptest! {
                     let first = all.iter().copied().find(on_side);
                     prop_assert_eq!(scene.closest_hit_filtered(&ray, None, on_side), first);
                     prop_assert_eq!(scene.any_hit_filtered(&ray, None, on_side), first.is_some());
+                    let of_side: Vec<Hit> = all.iter().copied().filter(on_side).collect();
+                    let (what, mut found) = (Crossings::Triangles, Vec::new());
+                    scene.all_hits_filtered_into(&ray, what, None, on_side, &mut found);
+                    prop_assert_eq!(&found, &of_side);
+                    prop_assert_eq!(scene.count_hits_filtered(&ray, what, None, on_side) as usize, of_side.len());
+                    scene.first_k_hits_filtered_into(&ray, 2, what, None, on_side, &mut found);
+                    prop_assert_eq!(&found[..], &of_side[..of_side.len().min(2)]);
                 }
             }
         }
@@ -198,8 +212,8 @@ proptest! {
     ) {
         let mut builder = SceneBuilder::default();
         let m = builder.add_mesh(vec![triangles(&mesh)]);
-        let group = builder.add_group(inner.iter().map(|at| (Child::Mesh(m), *at)));
-        let child = |of_group: bool| if of_group { Child::Group(group) } else { Child::Mesh(m) };
+        let group = builder.add_group(inner.iter().map(|at| (GroupMember::Mesh(m), *at)));
+        let child = |of_group: bool| if of_group { GroupMember::Group(group) } else { GroupMember::Mesh(m) };
         let groups = builder.add_group(outer.iter().map(|(of_group, at)| (child(*of_group), *at)));
         let mut world = World { meshes: vec![mesh.clone()], placed: Vec::new() };
         let mut paths = Vec::new();
@@ -276,16 +290,41 @@ fn what_does_not_exist_is_an_error() {
     assert_eq!(unknown.build().unwrap_err(), BuildError::NoSuchGroup { group: 0, count: 0 });
     // A group holds groups that were there before it: no circles.
     let mut circle = builder.clone();
-    circle.add_group([(Child::Group(0), DAffine3::IDENTITY)]);
-    assert_eq!(circle.build().unwrap_err(), BuildError::NoSuchGroup { group: 0, count: 0 });
+    circle.add_group([(GroupMember::Group(1), DAffine3::IDENTITY), (GroupMember::Group(0), DAffine3::IDENTITY)]);
+    circle.add_group([(GroupMember::Group(0), DAffine3::IDENTITY), (GroupMember::Group(1), DAffine3::IDENTITY)]);
+    circle.add_instances_of(0, DAffine3::IDENTITY);
+    circle.add_instances_of(1, DAffine3::IDENTITY);
+    assert_eq!(circle.build().unwrap_err(), BuildError::NoSuchGroup { group: 1, count: 0 });
     // Two of two of two ...: counted before anything is made.
-    let mut child = Child::Mesh(m);
+    let mut child = GroupMember::Mesh(m);
     for _ in 0..100 {
-        child = Child::Group(builder.add_group([(child, DAffine3::IDENTITY), (child, DAffine3::IDENTITY)]));
+        child = GroupMember::Group(builder.add_group([(child, DAffine3::IDENTITY), (child, DAffine3::IDENTITY)]));
     }
-    let Child::Group(all) = child else { unreachable!("a group") };
+    let GroupMember::Group(all) = child else { unreachable!("a group") };
     assert_eq!(builder.add_instances_of(all, DAffine3::IDENTITY), 1..1);
     assert!(matches!(builder.build().unwrap_err(), BuildError::TooMany { what: "instances", .. }));
+}
+
+/// Deep groups, and nothing of nothing of nothing, in no time and no stack.
+#[test]
+fn groups_may_be_deep_and_empty() {
+    let at = DAffine3::IDENTITY;
+    let mut builder = SceneBuilder::default();
+    let m = builder.add_mesh(vec![triangles(&(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]))]);
+    let mut empty = builder.add_group([]);
+    for _ in 0..70 {
+        empty = builder.add_group([(GroupMember::Group(empty), at), (GroupMember::Group(empty), at)]);
+    }
+    assert_eq!(builder.add_instances_of(empty, at), 0..0);
+    let mut deep = builder.add_group([(GroupMember::Group(empty), at), (GroupMember::Mesh(m), at)]);
+    for _ in 0..100_000 {
+        deep = builder.add_group([(GroupMember::Group(deep), at)]);
+    }
+    assert_eq!(builder.add_instances_of(deep, at), 0..1);
+    let scene = builder.build().expect("a triangle");
+    let path = scene.instance_path(0);
+    assert_eq!((path.len(), path.first(), path.last()), (100_002, Some(&0), Some(&1)));
+    assert!(scene.any_hit(&Ray::new(DVec3::new(0.2, 0.2, 1.0), DVec3::NEG_Z)));
 }
 
 #[test]

@@ -122,7 +122,8 @@ impl UserPrimitives for Odd {
     fn bounds(&self, i: u32) -> Aabb<f64> {
         if i == 1 { self.bounds } else { Aabb::new(DVec3::ZERO, DVec3::ONE) }
     }
-    fn closest_hit(&self, _: u32, _: &Ray<f64>) -> Option<SurfaceHit<f64>> {
+    fn closest_hit(&self, _: u32, ray: &Ray<f64>) -> Option<SurfaceHit<f64>> {
+        assert!(ray.t_min <= ray.t_max);
         Some(SurfaceHit { t: self.t, u: f64::NAN, v: 0.0, normal: Some(DVec3::NAN) })
     }
     fn is_flat(&self) -> bool {
@@ -145,6 +146,13 @@ fn odd_answers_of_the_user_do_no_harm() {
         assert!(scene.closest_hit(&ray).is_none() && !scene.any_hit(&ray), "{t}");
         assert!(scene.all_hits(&ray, Crossings::Surfaces).is_empty());
     }
+    // Not even where the ray has no end.
+    let scene = build(one, f64::INFINITY).expect("a box");
+    let endless = Ray::new(ray.origin, ray.direction);
+    assert!(scene.closest_hit(&endless).is_none() && reference::all_hits(&scene, &endless).is_empty());
+    assert!(reference::exact_crossings(&scene, &endless, Crossings::Triangles).is_empty());
+    // At the end of the interval, after which there is nothing to ask about.
+    assert_eq!(build(one, 9.0).expect("a box").all_hits(&ray, Crossings::Triangles).len(), 2);
     // The same hit again and again is one hit of each.
     let scene = build(one, 3.5).expect("a box");
     assert_eq!(scene.all_hits(&ray, Crossings::Triangles).len(), 2);

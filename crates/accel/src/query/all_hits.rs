@@ -112,16 +112,17 @@ impl Scene {
     }
 
     /// As [`Scene::all_hits_into`], of the hits that `accept` accepts, other than on the flat primitive `source`.
-    /// `accept` is asked about each hit once, in any order, before its normal is that of the world.
+    /// `accept` is asked about each hit once, in any order.
     pub fn all_hits_filtered_into(
         &self,
         ray: &Ray<f64>,
         crossings: Crossings,
         source: Option<HitId>,
-        accept: impl FnMut(&Hit) -> bool,
+        mut accept: impl FnMut(&Hit) -> bool,
         hits: &mut Vec<Hit>,
     ) {
         hits.clear();
+        let accept = |hit: &Hit| accept(&self.finished(*hit));
         let mut all = Collect::new(ray, self.flat(source), accept, All(hits));
         // It never breaks.
         let _ = self.collect(ray, crossings, &mut all);

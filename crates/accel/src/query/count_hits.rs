@@ -31,15 +31,16 @@ impl Scene {
     }
 
     /// As [`Scene::count_hits`], of the hits that `accept` accepts, other than on the flat primitive `source`. `accept`
-    /// is asked about each hit once, in any order, before its normal is that of the world.
+    /// is asked about each hit once, in any order.
     #[must_use]
     pub fn count_hits_filtered(
         &self,
         ray: &Ray<f64>,
         crossings: Crossings,
         source: Option<HitId>,
-        accept: impl FnMut(&Hit) -> bool,
+        mut accept: impl FnMut(&Hit) -> bool,
     ) -> u32 {
+        let accept = |hit: &Hit| accept(&self.finished(*hit));
         let mut count = Collect::new(ray, self.flat(source), accept, Count(0));
         // It never breaks.
         let _ = self.collect(ray, crossings, &mut count);

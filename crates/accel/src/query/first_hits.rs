@@ -68,15 +68,14 @@ impl Scene {
     }
 
     /// As [`Scene::first_k_hits`], of the hits that `accept` accepts, other than on the flat primitive `source`, into a list that
-    /// is emptied first and may be used again. `accept` is asked about hits in any order, before their normals are those of the
-    /// world.
+    /// is emptied first and may be used again. `accept` is asked about hits in any order.
     pub fn first_k_hits_filtered_into(
         &self,
         ray: &Ray<f64>,
         count: usize,
         crossings: Crossings,
         source: Option<HitId>,
-        accept: impl FnMut(&Hit) -> bool,
+        mut accept: impl FnMut(&Hit) -> bool,
         hits: &mut Vec<Hit>,
     ) {
         hits.clear();
@@ -84,6 +83,7 @@ impl Scene {
             return;
         }
         let order = |a: &Hit, b: &Hit| self.order(ray, a, b);
+        let accept = |hit: &Hit| accept(&self.finished(*hit));
         let mut first = Collect::new(ray, self.flat(source), accept, First { count, order, hits: &mut *hits });
         // It never breaks.
         let _ = self.collect(ray, crossings, &mut first);

@@ -47,6 +47,9 @@ impl Scene {
     /// The shapes of the scene's trees, to be kept in a file and used by [`SceneBuilder::build_with_trees`]: some six
     /// bytes a triangle of the wide layout.
     ///
+    /// Shapes and primitives of the user's own are not in the hash: a tree of as many others gives the right answers too, but
+    /// slower ones.
+    ///
     /// Meshes of the layout [`Compact8`](crate::Layout::Compact8) are left out: they are built anew.
     ///
     /// ```

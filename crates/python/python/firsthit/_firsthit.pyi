@@ -163,12 +163,13 @@ class Scene:
         self, transforms: ArrayLike, *, masks: ArrayLike | None = None, threads: int = 0
     ) -> Scene:
         """This scene with its instances elsewhere: matrices ``(n, 4, 4)``. Of more there are more instances, of fewer the last
-        are gone. The mesh and its tree are shared with this scene, which stays as it is.
+        are gone. Masks stay unless there are new ones. The mesh and its tree are shared with this scene, which stays as it is.
 
         Raises ValueError: for matrices that are not affine or cannot be inverted, and for scenes of files.
         """
     def seen_by(self, mask: int) -> Scene:
-        """This scene for queries that meet only the instances whose mask has one of these bits. Everything is shared."""
+        """This scene for queries that meet only the instances whose mask has one of these bits. The mesh and
+        its tree are shared. Instances of files have all bits."""
     def closest_hit(
         self,
         rays: ArrayLike,
