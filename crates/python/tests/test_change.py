@@ -72,7 +72,7 @@ def test_masks_choose_instances():
 
 
 def test_pictures_show_what_the_mask_sees():
-    camera = dict(width=8, height=8, samples=1, position=(0.5, 0.5, 9), focal_point=(0.5, 0.5, 0), view_up=(0, 1, 0), transparent=True)
+    camera = dict(width=8, height=8, samples=1, position=(0.5, 0.5, 0.5), focal_point=(0.5, 0.5, 0), view_up=(0, 1, 0), transparent=True)
     scene = firsthit.Scene(SQUARE, TRIANGLES, transforms=moved([0, 0, 0], [9, 0, 0]), masks=[1, 2])
     alpha = [firsthit.render(scene.seen_by(mask), **camera)[4, 4, 3] for mask in (3, 1, 2)]
     assert alpha == [255, 255, 0]
