@@ -197,7 +197,7 @@ pub fn verdict(row: &Row) -> Option<Verdict> {
 /// Why a count of triangles may differ from the inventory's as it does.
 #[must_use]
 pub fn known_difference(row: &Row) -> Option<&'static str> {
-    let difference = row.triangles?.checked_signed_diff(row.known.triangles?)?;
+    let difference = i64::try_from(row.triangles?).ok()? - i64::try_from(row.known.triangles?).ok()?;
     DIFFERENT.iter().find(|(end, by, _)| row.file.ends_with(end) && *by == difference).map(|(_, _, why)| *why)
 }
 
