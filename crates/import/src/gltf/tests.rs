@@ -60,8 +60,10 @@ fn images_of_one_file_are_one() {
 
 /// Adds a mesh that has the first two materials.
 fn show_materials(document: &mut Value) {
-    document["accessors"] = json!([{"type": "VEC3", "componentType": 5126, "count": 3}]);
-    let primitive = |material: u32| json!({"attributes": {"POSITION": 0}, "material": material});
+    let accessor = |kind: &str| json!({"type": kind, "componentType": 5126, "count": 3});
+    document["accessors"] = json!([accessor("VEC3"), accessor("VEC2")]);
+    let attributes = json!({"POSITION": 0, "TEXCOORD_0": 1});
+    let primitive = |material: u32| json!({"attributes": attributes, "material": material});
     document["meshes"] = json!([{"primitives": [primitive(0), primitive(1)]}]);
     document["nodes"] = json!([{"mesh": 0}]);
 }
