@@ -10,6 +10,7 @@ answer is compared with what firsthit says at its exact tier, which is compared 
 """
 
 import argparse
+import ctypes
 import gc
 import importlib.metadata
 import json
@@ -17,6 +18,7 @@ import os
 import platform
 import subprocess
 import sys
+import tempfile
 import time
 
 import numpy as np
@@ -181,26 +183,48 @@ def builds(args, mesh):
 
 
 def resident():
+    """Bytes of memory that the process has, without what was freed and kept for later."""
+    gc.collect()
+    try:
+        ctypes.CDLL(None).malloc_trim(0)
+    except AttributeError:
+        pass  # another C library
     with open("/proc/self/statm") as file:
         return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
-def memory(model, name):
-    """Bytes that a process has more after the engine was built, its copy of the mesh included."""
-    _, mesh = inputs.load(model)
+def memory(arrays, name):
+    """Prints how many bytes a process has more after the engine was built, its copy of the mesh included."""
     kinds = [engines.PlainWarp if engine is getattr(engines, "Warp", None) else engine for engine in engines.ENGINES]
     kind = next(engine for engine in kinds if engine.name == name)
-    # Once with a small mesh: what the libraries themselves need. The arrays of the right type are made by each engine again.
-    import trimesh
-
-    first = kind(trimesh.creation.icosphere(2))
-    mesh.vertices, mesh.faces, mesh.bounds
-    gc.collect()
+    with np.load(arrays) as file:
+        mesh = Arrays(file["vertices"], file["faces"])
+    # Once with a small mesh: what the libraries themselves need.
+    first = kind(Arrays(mesh.vertices, mesh.faces[:100]))
     before = resident()
     built = kind(mesh)
-    gc.collect()
     print(json.dumps({"bytes": resident() - before}))
     del built, first
+
+
+class Arrays:
+    """As much of a mesh as engines are built of."""
+
+    def __init__(self, vertices, faces):
+        self.vertices, self.faces = vertices, faces
+
+
+def bytes_per_triangle(mesh):
+    found = {}
+    with tempfile.TemporaryDirectory() as folder:
+        arrays = os.path.join(folder, "mesh.npz")
+        np.savez(arrays, vertices=mesh.vertices.astype("f4"), faces=np.asarray(mesh.faces))
+        for kind in engines.ENGINES:
+            run = [sys.executable, __file__, "--memory", kind.name, arrays]
+            output = subprocess.run(run, capture_output=True, text=True)
+            if output.returncode == 0:
+                found[kind.name] = json.loads(output.stdout.splitlines()[-1])["bytes"] / len(mesh.faces)
+    return found
 
 
 def table(rows, keys, names, cell):
@@ -231,12 +255,7 @@ def measure(args, model, say):
     result = {"model": name, "triangles": count, "watertight": truth.scene.is_watertight()}
 
     result["build"] = builds(args, mesh)
-    result["bytes_per_triangle"] = {}
-    for kind in engines.ENGINES:
-        run = [sys.executable, __file__, "--memory", kind.name, model]
-        output = subprocess.run(run, capture_output=True, text=True)
-        if output.returncode == 0:
-            result["bytes_per_triangle"][kind.name] = json.loads(output.stdout.splitlines()[-1])["bytes"] / count
+    result["bytes_per_triangle"] = bytes_per_triangle(mesh)
     own = engines.Firsthit(mesh).scene.stats
     result["own_bytes_per_triangle"] = own["bytes"] / count
     say("| engine | build, s: best (median) | bytes a triangle |\n|---|---|---|")
