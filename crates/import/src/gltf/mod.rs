@@ -45,7 +45,6 @@ mod typed;
 mod uri;
 mod variant;
 
-use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
@@ -57,7 +56,7 @@ use accessor::Layout;
 use mesh::MeshReader;
 use node::Nodes;
 use source::Source;
-use texture::Textures;
+use texture::{Numbered, Textures};
 
 use crate::cache::{Kept, Key};
 use crate::open::Then;
@@ -204,7 +203,7 @@ fn seen(source: &Source<'_>, nodes: &Nodes, variant: Option<u32>, decode: Decode
 fn images(
     source: &Source<'_>,
     textures: &Textures<'_>,
-    encoded: &[(usize, Cow<'_, [u8]>)],
+    encoded: &[Numbered<'_>],
     options: &Options,
     report: &mut Report,
 ) -> Vec<ImageDesc> {

@@ -28,6 +28,9 @@ pub(super) struct Textures<'a> {
     wanted: Vec<bool>,
 }
 
+/// The bytes of an image, and its place among those that are used.
+pub(super) type Numbered<'a> = (usize, Cow<'a, [u8]>);
+
 /// What the different kinds of texture references of a material have in common.
 pub(super) struct Info<'a> {
     pub(super) index: Index<Texture>,
@@ -113,7 +116,7 @@ impl<'a> Textures<'a> {
     ///
     /// # Errors
     /// If all together would take too much memory.
-    pub(super) fn encoded(&self, report: &mut Report) -> Result<Vec<(usize, Cow<'a, [u8]>)>, ImportError> {
+    pub(super) fn encoded(&self, report: &mut Report) -> Result<Vec<Numbered<'a>>, ImportError> {
         let mut encoded = Vec::new();
         // Encoded images are held all at once.
         let mut left = *self.source.limits;
@@ -145,7 +148,7 @@ impl<'a> Textures<'a> {
 
     /// Decodes images in parallel; white stands for the others that are used. One that cannot be decoded is replaced as
     /// well, with a warning.
-    pub(super) fn decode(&self, encoded: &[(usize, Cow<'_, [u8]>)], report: &mut Report) -> Vec<ImageDesc> {
+    pub(super) fn decode(&self, encoded: &[Numbered<'_>], report: &mut Report) -> Vec<ImageDesc> {
         let names: Vec<String> = self.used.iter().map(|&i| self.name(i)).collect();
         let sources: Vec<_> = encoded.iter().map(|(k, bytes)| Encoded { name: &names[*k], bytes }).collect();
         let (limits, stages) = (self.source.limits, self.source.stages);
