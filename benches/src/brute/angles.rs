@@ -79,6 +79,7 @@ struct Product {
 }
 
 #[inline(always)]
+#[allow(clippy::needless_range_loop, reason = "lanes side by side")]
 fn sum(angles: &Angles, point: DVec3) -> f64 {
     let count = angles.corners[0].len();
     let columns: [&[f64]; 9] = std::array::from_fn(|k| &angles.corners[k][..count]);

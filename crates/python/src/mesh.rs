@@ -133,10 +133,7 @@ fn matrices(object: &Bound<'_, PyAny>) -> PyResult<Vec<DAffine3>> {
             return Err(error::value(format_args!("transforms: the last row of matrix {i} is not 0, 0, 0, 1")));
         }
         let column = |c| DVec3::new(at(0, c), at(1, c), at(2, c));
-        Ok(DAffine3 {
-            matrix3: DMat3::from_cols(column(0), column(1), column(2)).into(),
-            translation: column(3).into(),
-        })
+        Ok(DAffine3 { matrix3: DMat3::from_cols(column(0), column(1), column(2)), translation: column(3) })
     };
     (0..count).map(matrix).collect()
 }
@@ -144,7 +141,7 @@ fn matrices(object: &Bound<'_, PyAny>) -> PyResult<Vec<DAffine3>> {
 /// The matrices as [`matrices`] reads them.
 pub(crate) fn rows(places: &[(DAffine3, u32)]) -> Vec<f64> {
     let of = |(m, _): &(DAffine3, u32)| {
-        let (m, t) = (DMat3::from(m.matrix3), DVec3::from(m.translation));
+        let (m, t) = (m.matrix3, m.translation);
         let row = |r: usize| [m.x_axis[r], m.y_axis[r], m.z_axis[r], t[r]];
         [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]].concat()
     };

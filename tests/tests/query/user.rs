@@ -64,7 +64,7 @@ proptest! {
                     places.iter().for_each(|at| _ = builder.add_instance(m, *at));
                     builder.build().expect("good shapes")
                 };
-                let known = scene(balls.iter().map(|b| Geometry::Shape(b.clone().into())).collect());
+                let known = scene(balls.iter().map(|b| Geometry::Shape((*b).into())).collect());
                 let user = scene(vec![Geometry::User(Arc::new(Balls(balls.clone())))]);
                 prop_assert_eq!(user.bounds(), known.bounds());
                 let at = |p: DVec3| known.bounds().center() + p * known.bounds().extent();
