@@ -50,6 +50,11 @@ impl Limits {
         self.memory.unwrap_or_else(|| read.saturating_mul(self.expansion).saturating_add(FREE))
     }
 
+    /// Most instances in a scene of so many bytes: one takes a few hundred, and twice that while it is made.
+    pub(crate) fn instances_of(&self, read: u64) -> u64 {
+        self.instances.min(self.made_of(read) / 1024)
+    }
+
     /// Most bytes that so many compressed ones may become.
     pub(crate) fn decompressed(&self, compressed: u64) -> u64 {
         self.file_bytes.min(self.made_of(compressed))

@@ -62,8 +62,8 @@ struct Sparse<'a> {
     values: Strided<'a>,
 }
 
-/// More zeros than any accessor has a use for: they cost the file nothing, but the reader memory.
-const MOST_ZEROS: u64 = 1 << 24;
+/// More zeros than any accessor of a small file has a use for: they cost the file nothing, but the reader memory.
+const MOST_ZEROS: u64 = 1 << 20;
 
 /// Most bytes of zeros that all accessors together may be read as.
 const MOST_ZERO_BYTES: u64 = 1 << 28;
@@ -174,7 +174,7 @@ impl<'a> Accessor<'a> {
     pub(super) fn new(source: &'a Source<'_>, index: Index<json::Accessor>) -> Result<Self, ImportError> {
         let Layout { count, kind, format, data, sparse } = Layout::new(source, index)?;
         if data.is_none() {
-            check_count(source, index, MOST_ZEROS)?;
+            check_count(source, index, MOST_ZEROS.saturating_add(source.bytes()))?;
             let bytes = count.saturating_mul(element_size(kind, ComponentType::F32).1);
             let Some(left) = source.zeros.0.load(Relaxed).checked_sub(bytes) else {
                 let cause = "accessors without data are read so often that their zeros would take too much memory";
@@ -371,7 +371,7 @@ mod tests {
             assert!(one(&a, None, &[0; 16]).is_err(), "{count} {offset}");
         }
         let zeros = r#""accessors": [{"type": "VEC2", "componentType": 5126, "count": 1000000000}]"#;
-        assert!(with(zeros, &[], |_| ()).unwrap_err().contains("more than the limit of 16777216"));
+        assert!(with(zeros, &[], |_| ()).unwrap_err().contains("more than the limit of 1048576"));
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! What is done with each extension of glTF: one table, read by the loader, by reports and by the documentation.
 
+use std::collections::HashSet;
 use std::path::Path;
 
 use gltf::json::Root;
@@ -99,8 +100,10 @@ pub(super) fn check(file: &Path, root: &Root, report: &mut Report) -> Result<(),
         let place = format!("/extensionsRequired/{i}");
         return Err(ImportError::unsupported(file, place, format!("the file requires {name}, {cause}")));
     }
+    let required: HashSet<&String> = root.extensions_required.iter().collect();
+    let mut seen = HashSet::new();
     for (i, name) in root.extensions_used.iter().enumerate() {
-        if report.extensions.iter().any(|e| e.name == *name) {
+        if !seen.insert(name) {
             continue;
         }
         let known = find(name);
@@ -108,11 +111,11 @@ pub(super) fn check(file: &Path, root: &Root, report: &mut Report) -> Result<(),
         if support == Unsupported {
             report.warn(file, format!("/extensionsUsed/{i}"), format!("{name} is not supported: {note}"));
         }
-        let required = root.extensions_required.contains(name);
+        let required = required.contains(name);
         report.extensions.push(ExtensionUse { name: name.clone(), required, support, note });
     }
     for name in &root.extensions_required {
-        if !report.extensions.iter().any(|e| e.name == *name)
+        if seen.insert(name)
             && let Some(e) = find(name)
         {
             report.extensions.push(ExtensionUse {

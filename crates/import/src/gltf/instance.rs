@@ -76,6 +76,7 @@ pub(super) fn place(
     // The node of each instance.
     let mut drawn: Vec<usize> = Vec::new();
     let mut weight = 0_u64;
+    let most = source.limits.instances_of(source.bytes());
     for &node in &nodes.drawn {
         let Some(&(mesh, transform)) = placed.get(&node) else { continue };
         let name = source.root.nodes[node].name.clone().unwrap_or_else(|| format!("node {node}"));
@@ -89,9 +90,8 @@ pub(super) fn place(
         };
         // Names are copied: a long one counts as several instances.
         weight = weight.saturating_add(places.len() as u64 * (1 + name.len() as u64 / 256));
-        if weight > source.limits.instances {
-            let cause =
-                format!("with this node there are more instances than the limit of {}", source.limits.instances);
+        if weight > most {
+            let cause = format!("with this node there are more instances than the limit of {most}");
             return Err(source.at(format!("/nodes/{node}"), ErrorKind::Limit(cause)));
         }
         drawn.resize(drawn.len() + places.len(), node);

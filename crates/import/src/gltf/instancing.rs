@@ -51,8 +51,9 @@ pub(super) fn transforms(source: &Source<'_>, node: usize) -> Result<Option<Vec<
             return Err(source.invalid(place(), format!("element {index} does not exist: there are {accessors}")));
         }
         let wanted = source.root.accessors[index].count.0;
-        if wanted > source.limits.instances {
-            let cause = format!("{wanted} instances are more than the limit of {}", source.limits.instances);
+        let most = source.limits.instances_of(source.bytes());
+        if wanted > most {
+            let cause = format!("{wanted} instances are more than the limit of {most}");
             return Err(source.at(place(), ErrorKind::Limit(cause)));
         }
         let accessor = Accessor::new(source, Index::new(index as u32))?;

@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use super::typed;
 pub(super) use super::typed::typed;
-use crate::ImportError;
+use crate::{ErrorKind, ImportError, Limits};
 
 /// A file's JSON.
 #[derive(Debug)]
@@ -25,13 +25,14 @@ pub(crate) struct Document {
 ///
 /// # Errors
 /// If it is no JSON, no glTF 2, or a value has the wrong type.
-pub(super) fn parse(file: &Path, text: &[u8]) -> Result<Document, ImportError> {
+pub(super) fn parse(file: &Path, text: &[u8], limits: &Limits) -> Result<Document, ImportError> {
     // Some editors put a byte order mark in front, which JSON readers may pass over (RFC 8259). Some exporters fill
     // the chunk of a GLB up with zeros.
     let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
     let end = text.iter().rposition(|&b| b != 0).map_or(0, |last| last + 1);
     let mut value = typed::parse(file, &text[..end])?;
     check_version(file, &value)?;
+    check_counts(file, &value, limits.made_of(text.len() as u64))?;
     let mut animations = match value.get_mut("animations").map(Value::take) {
         Some(Value::Array(animations)) => animations,
         _ => Vec::new(),
@@ -67,6 +68,28 @@ fn whole_numbers(value: &mut Value) {
         }
         _ => {}
     }
+}
+
+/// About how many bytes of memory an element takes, in all that is made of it. Some are only `{}` in the file.
+const COSTS: [(&str, u64); 4] = [("materials", 3400), ("meshes", 1000), ("nodes", 500), ("scenes", 900)];
+/// That of a primitive of a mesh.
+const COST_OF_PRIMITIVE: u64 = 2600;
+
+/// Counts what takes more memory than its text lets expect.
+fn check_counts(file: &Path, value: &Value, most: u64) -> Result<(), ImportError> {
+    let list = |value: &'_ Value, key: &str| value.get(key).and_then(Value::as_array).map_or(0, Vec::len) as u64;
+    let meshes = value.get("meshes").and_then(Value::as_array);
+    let primitives: u64 = meshes.into_iter().flatten().map(|mesh| list(mesh, "primitives")).sum();
+    let counted = COSTS.map(|(key, cost)| (key, list(value, key), cost)).into_iter();
+    let mut bytes = 0_u64;
+    for (key, count, cost) in counted.chain([("meshes", primitives, COST_OF_PRIMITIVE)]) {
+        bytes += count * cost;
+        if bytes > most {
+            let cause = format!("{count} of them would take more memory than the limit of {most} bytes");
+            return Err(ImportError::new(file, format!("/{key}"), ErrorKind::Limit(cause)));
+        }
+    }
+    Ok(())
 }
 
 fn check_version(file: &Path, value: &Value) -> Result<(), ImportError> {
@@ -275,7 +298,10 @@ mod tests {
 
     fn error(text: &str) -> String {
         let file = Path::new("a.gltf");
-        parse(file, text.as_bytes()).and_then(|d| check_references(file, &d.root)).unwrap_err().to_string()
+        parse(file, text.as_bytes(), &Limits::default())
+            .and_then(|d| check_references(file, &d.root))
+            .unwrap_err()
+            .to_string()
     }
 
     #[test]
@@ -292,7 +318,7 @@ mod tests {
         assert!(
             error(r#"{"asset": {"version": "2.0", "minVersion": "2.1"}}"#).starts_with("a.gltf: /asset/minVersion")
         );
-        assert!(parse(Path::new(""), br#"{"asset": {"version": "2.1"}}"#).is_ok());
+        assert!(parse(Path::new(""), br#"{"asset": {"version": "2.1"}}"#, &Limits::default()).is_ok());
     }
 
     #[test]
@@ -310,7 +336,7 @@ mod tests {
     #[test]
     fn whole_floats_are_integers() {
         let text = r#"{"asset": {"version": "2.0"}, "nodes": [{"mesh": 1.0, "translation": [2.0, 0.5, -0.0]}]}"#;
-        let document = parse(Path::new(""), text.as_bytes()).unwrap();
+        let document = parse(Path::new(""), text.as_bytes(), &Limits::default()).unwrap();
         assert_eq!(document.root.nodes[0].mesh.unwrap().value(), 1);
         assert_eq!(document.root.nodes[0].translation, Some([2.0, 0.5, 0.0]));
         let text = r#"{"asset": {"version": "2.0"}, "nodes": [{"mesh": 1.5}]}"#;
@@ -320,11 +346,11 @@ mod tests {
     #[test]
     fn animations_are_set_aside() {
         let text = r#"{"asset": {"version": "2.0"}, "animations": [{"channels": "none"}, 7]}"#;
-        assert_eq!(parse(Path::new(""), text.as_bytes()).unwrap().animations.len(), 2);
+        assert_eq!(parse(Path::new(""), text.as_bytes(), &Limits::default()).unwrap().animations.len(), 2);
     }
 
     #[test]
     fn a_scene_may_be_empty() {
-        assert!(parse(Path::new(""), br#"{"asset": {"version": "2.0"}, "scenes": [{}]}"#).is_ok());
+        assert!(parse(Path::new(""), br#"{"asset": {"version": "2.0"}, "scenes": [{}]}"#, &Limits::default()).is_ok());
     }
 }

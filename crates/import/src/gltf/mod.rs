@@ -106,7 +106,7 @@ pub(crate) fn read_bytes(
         }
         (bytes, None)
     };
-    let parse = || timed(stages, Stage::Parse, || json::parse(path, text));
+    let parse = || timed(stages, Stage::Parse, || json::parse(path, text, &options.limits));
     let document = match &options.images {
         Some(cache) => cache.document(path, parse)?,
         None => Arc::new(parse()?),

@@ -214,10 +214,15 @@ impl Builder<'_> {
     fn place(&mut self, parts: &Placeable, transform: DAffine3) -> Result<(), ImportError> {
         self.placed = self.placed.saturating_add(parts.count());
         let limits = &self.options.limits;
-        for (count, limit, what) in [
-            (self.placed, limits.instances, "instances, lights and cameras"),
-            (self.triangles, limits.elements, "triangles"),
-        ] {
+        // Files that name each other again and again make much of little.
+        let mut most = limits.instances_of(0);
+        if self.placed > most {
+            let bytes = |file: &PathBuf| std::fs::metadata(file).map_or(0, |m| m.len());
+            most = limits.instances_of(self.report.files.iter().map(bytes).sum());
+        }
+        for (count, limit, what) in
+            [(self.placed, most, "instances, lights and cameras"), (self.triangles, limits.elements, "triangles")]
+        {
             if count > limit {
                 let cause = format!("{count} {what} are more than the limit of {limit}");
                 return Err(ImportError::new(self.path, "objects", ErrorKind::Limit(cause)));

@@ -10,8 +10,7 @@ mod sound;
 mod wrapped;
 
 pub use accessors::accessors;
-use promise::promise;
-pub use promise::{Counting, prepare};
+pub use promise::{Counting, prepare, promise};
 pub use wrapped::{draco, image, meshopt};
 
 use crate::Check;

@@ -31,7 +31,7 @@ const LONGEST: Duration = Duration::from_secs(20);
 /// - An error names one of the files, in few words.
 /// - Whatever a scene says can be relied on, see [`sound`].
 /// - The same holds at a moment of its animations, if it has any.
-pub(super) fn promise(files: &[(&str, &[u8])]) -> Option<Imported> {
+pub fn promise(files: &[(&str, &[u8])]) -> Option<Imported> {
     let desk = Desk::take();
     let folder = desk.0.as_ref().expect("laid open").path();
     for (name, bytes) in files {
