@@ -77,6 +77,11 @@ fn assign(mesh: &mut TriangleMesh, tangents: &[Option<Vec4>]) {
         let mut vertex = mesh.triangles[corner / 3][corner % 3] as usize;
         let tangent = tangent
             .filter(|t| t.is_finite() && t.truncate().length_squared() > 0.5)
+            // Those of tiny or huge triangles come out longer or shorter.
+            .and_then(|t| match t.truncate() {
+                unit if unit.is_normalized() => Some(t),
+                other => unit::single(other).map(|unit| unit.extend(t.w)),
+            })
             .unwrap_or_else(|| mesh.normals[vertex].any_orthonormal_vector().extend(1.0));
         while mesh.tangents[vertex] != Vec4::ZERO && mesh.tangents[vertex] != tangent {
             if next[vertex] == u32::MAX {
