@@ -44,7 +44,7 @@ pub fn read(path: impl AsRef<Path>, limits: &Limits) -> Result<ImageDesc, Import
 /// [`ErrorKind::Unsupported`], [`ErrorKind::Limit`] or [`ErrorKind::Invalid`].
 pub fn decode(bytes: &[u8], name: &str, limits: &Limits) -> Result<ImageDesc, ErrorKind> {
     let size = Size::of(bytes, limits)?;
-    size.check(limits.image_bytes)?;
+    size.check(limits.image_bytes.min(limits.made_of(bytes.len() as u64)))?;
     let (width, height, pixels) = if is_exr(bytes) {
         decode_exr(bytes)?
     } else if ktx2::is_ktx2(bytes) {

@@ -1,7 +1,7 @@
 //! A glTF file with its buffers: what all other modules here read from.
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::ops::Range;
 use std::path::Path;
 
@@ -48,7 +48,7 @@ impl<'a> Source<'a> {
             Self { file, root, folder, limits, stages, cache: options.images.as_ref(), zeros, buffers, decompressed };
         let compressed = Compressed::all(&source)?;
         let fallback = meshopt::unread_buffers(root, &compressed);
-        let mut total = 0_u64;
+        let (mut total, mut distinct, mut named) = (0_u64, 0_u64, HashSet::new());
         for (i, buffer) in root.buffers.iter().enumerate() {
             let place = format!("/buffers/{i}");
             let bytes = match (&buffer.uri, bin) {
@@ -57,7 +57,13 @@ impl<'a> Source<'a> {
                 (None, Some(bin)) if i == 0 => Some(Cow::Borrowed(bin)),
                 (None, _) => None,
             };
-            total += bytes.as_ref().map_or(0, |b| b.len() as u64);
+            let length = bytes.as_ref().map_or(0, |b| b.len() as u64);
+            total += length;
+            // Buffers that name one file hold it once each.
+            if buffer.uri.as_deref().is_none_or(|uri| named.insert(uri)) {
+                distinct += length;
+            }
+            limits.check_memory("its buffers", total, distinct).map_err(|kind| source.at(place.as_str(), kind))?;
             if total > limits.file_bytes {
                 let cause = format!("the buffers have more bytes than the limit of {}", limits.file_bytes);
                 return Err(source.at(place, ErrorKind::Limit(cause)));

@@ -120,11 +120,12 @@ pub fn image(data: &[u8]) -> bool {
         r#"{{"asset": {{"version": "2.0"}}, "extensionsUsed": ["KHR_texture_basisu"],
         "buffers": [{{"byteLength": {}}}], "bufferViews": [{{"buffer": 0, "byteLength": {length}}},
         {{"buffer": 0, "byteOffset": {start}, "byteLength": 36}}],
-        "accessors": [{{"bufferView": 1, "type": "VEC3", "componentType": 5126, "count": 3}}],
+        "accessors": [{{"bufferView": 1, "type": "VEC3", "componentType": 5126, "count": 3}},
+        {{"bufferView": 1, "type": "VEC2", "componentType": 5126, "count": 3}}],
         "images": [{{"bufferView": 0, "mimeType": "{kind}"}}], "textures": [{{{texture}}}],
         "materials": [{{"pbrMetallicRoughness": {{"baseColorTexture": {{"index": 0}}}}}}],
         "nodes": [{{"mesh": 0}}],
-        "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}, "material": 0}}]}}]}}"#,
+        "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0, "TEXCOORD_0": 1}}, "material": 0}}]}}]}}"#,
         bin.len()
     );
     promise(&[("m.glb", &container(&json, &bin))]).is_some_and(|i| i.report.warnings.is_empty())
