@@ -153,8 +153,9 @@ fn painted(image: &str) -> String {
         r#"{{"asset": {{"version": "2.0"}}, "images": [{{"uri": "{image}"}}], "textures": [{{"source": 0}}],
             "materials": [{{"name": "paint", "pbrMetallicRoughness": {{"baseColorTexture": {{"index": 0}}}}}}],
             "buffers": [{{"byteLength": 36, "uri": "a.bin"}}], "bufferViews": [{{"buffer": 0, "byteLength": 36}}],
-            "accessors": [{{"bufferView": 0, "type": "VEC3", "componentType": 5126, "count": 3}}],
-            "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}, "material": 0}}]}}],
+            "accessors": [{{"bufferView": 0, "type": "VEC3", "componentType": 5126, "count": 3}},
+                {{"bufferView": 0, "type": "VEC2", "componentType": 5126, "count": 3}}],
+            "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0, "TEXCOORD_0": 1}}, "material": 0}}]}}],
             "nodes": [{{"mesh": 0}}, {{"mesh": 0}}], "scenes": [{{"nodes": [0]}}, {{"nodes": [1]}}], "scene": 0}}"#
     )
 }
