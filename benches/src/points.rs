@@ -6,8 +6,6 @@
 use std::hint::black_box;
 use std::time::Duration;
 
-use bvh::aabb::{Aabb, Bounded};
-use bvh::bounding_hierarchy::BHShape;
 use bvh::bvh::Bvh;
 use bvh::point_query::PointDistance;
 use firsthit_accel::{BuildOptions, Geometry, Scene, SceneBuilder, Solid};
@@ -24,6 +22,7 @@ use parry3d::shape::{TriMesh, TriMeshFlags};
 use serde::Serialize;
 
 use crate::model::Model;
+use crate::peer::flat_bvh::Triangle;
 
 /// One engine at one kind of queries.
 #[derive(Clone, Debug, Serialize)]
@@ -47,26 +46,6 @@ pub struct Row {
     /// Wrong answers: distances off by more than 1e-5 of the model's diagonal, or the wrong side of a surface that is farther
     /// away than a millionth of it. `None` where it was not looked at.
     pub wrong: Option<usize>,
-}
-
-struct Triangle {
-    corners: [Vec3; 3],
-    node: usize,
-}
-
-impl Bounded<f32, 3> for Triangle {
-    fn aabb(&self) -> Aabb<f32, 3> {
-        self.corners.iter().fold(Aabb::empty(), |b, p| b.grow(&Point3::new(p.x, p.y, p.z)))
-    }
-}
-
-impl BHShape<f32, 3> for Triangle {
-    fn set_bh_node_index(&mut self, index: usize) {
-        self.node = index;
-    }
-    fn bh_node_index(&self) -> usize {
-        self.node
-    }
 }
 
 impl PointDistance<f32, 3> for Triangle {

@@ -12,9 +12,11 @@ use nalgebra::Point3;
 
 use super::{Answer, Peer, Ray32};
 
-struct Triangle {
-    corners: [Vec3; 3],
-    node: usize,
+/// A triangle in a tree of the `bvh` crate.
+pub(crate) struct Triangle {
+    pub(crate) corners: [Vec3; 3],
+    /// The tree says which it is in.
+    pub(crate) node: usize,
 }
 
 impl Bounded<f32, 3> for Triangle {

@@ -2,7 +2,7 @@
 
 mod embree;
 mod firsthit;
-mod flat_bvh;
+pub(crate) mod flat_bvh;
 mod obvhs;
 mod parry;
 #[cfg(feature = "tinybvh")]
