@@ -8,6 +8,7 @@ use glam::{DAffine3, Vec3};
 
 use crate::groups::Groups;
 use crate::instance::Placed;
+use crate::progress::Watch;
 use crate::{BuildError, BuildOptions, Scene, UserPrimitives};
 
 /// A part of a mesh.
@@ -27,6 +28,17 @@ pub enum Geometry {
     User(Arc<dyn UserPrimitives>),
 }
 
+impl Geometry {
+    /// How many primitives it has.
+    pub(crate) fn count(&self) -> u64 {
+        match self {
+            Self::Triangles { triangles, .. } => triangles.len() as u64,
+            Self::Shape(_) => 1,
+            Self::User(user) => user.count().into(),
+        }
+    }
+}
+
 /// Gathers meshes and instances, then builds.
 #[derive(Clone, Debug, Default)]
 pub struct SceneBuilder {
@@ -34,6 +46,7 @@ pub struct SceneBuilder {
     meshes: Vec<Vec<Geometry>>,
     instances: Vec<Placed>,
     groups: Groups,
+    /// What went wrong first.
     error: Option<BuildError>,
 }
 
@@ -78,10 +91,13 @@ impl SceneBuilder {
         let count = self.instances.len();
         match self.instances.get_mut(instance) {
             Some(placed) => placed.mask = mask,
-            None => {
-                self.error.get_or_insert(BuildError::NoSuchInstance { instance, count });
-            }
+            None => self.fail(BuildError::NoSuchInstance { instance, count }),
         }
+    }
+
+    /// Kept until it is built.
+    pub(crate) fn fail(&mut self, error: BuildError) {
+        self.error.get_or_insert(error);
     }
 
     pub(crate) fn placed(&self) -> &[Placed] {
@@ -97,7 +113,7 @@ impl SceneBuilder {
     }
 
     pub(crate) fn into_parts(self) -> Result<Parts, BuildError> {
-        if let Some(error) = self.error.or(self.groups.error().cloned()) {
+        if let Some(error) = self.error {
             return Err(error);
         }
         let Self { options, meshes, instances, groups, .. } = self;
@@ -109,8 +125,7 @@ impl SceneBuilder {
     /// # Errors
     /// When a vertex, index or transform is unusable: see [`BuildError`].
     pub fn build(self) -> Result<Scene, BuildError> {
-        let Parts { options, meshes, instances, groups } = self.into_parts()?;
-        Scene::new(options, &meshes, instances, groups, None)
+        self.into_parts()?.build(None)
     }
 
     /// The same, watched: `watch` is told now and then, by any thread, which part of the work is done, from 0 to 1. If it
@@ -132,8 +147,7 @@ impl SceneBuilder {
     /// # Errors
     /// As [`SceneBuilder::build`], and [`BuildError::Cancelled`].
     pub fn build_watched(self, watch: &(dyn Fn(f64) -> ControlFlow<()> + Sync)) -> Result<Scene, BuildError> {
-        let Parts { options, meshes, instances, groups } = self.into_parts()?;
-        Scene::new(options, &meshes, instances, groups, Some(watch))
+        self.into_parts()?.build(Some(watch))
     }
 }
 
@@ -143,6 +157,13 @@ pub(crate) struct Parts {
     pub(crate) meshes: Vec<Vec<Geometry>>,
     pub(crate) instances: Vec<Placed>,
     pub(crate) groups: Arc<Groups>,
+}
+
+impl Parts {
+    fn build(self, watch: Watch<'_>) -> Result<Scene, BuildError> {
+        let Self { options, meshes, instances, groups } = self;
+        Scene::new(options, &meshes, instances, groups, watch)
+    }
 }
 
 /// The parts of a mesh of a file.

@@ -33,8 +33,6 @@ pub(crate) struct Groups {
     groups: Vec<Group>,
     /// The instances that came of a group.
     placed: Vec<(Range<usize>, usize)>,
-    /// What went wrong first.
-    error: Option<BuildError>,
 }
 
 impl Groups {
@@ -44,10 +42,6 @@ impl Groups {
             GroupMember::Mesh(_) => 1,
             GroupMember::Group(g) => self.groups.get(g).and_then(|g| g.ends.last().copied()).unwrap_or(0),
         }
-    }
-
-    fn fail(&mut self, error: BuildError) {
-        self.error.get_or_insert(error);
     }
 
     /// The instances of a group, depth first. On a stack of its own: groups may be nested deeply.
@@ -67,10 +61,6 @@ impl Groups {
                 GroupMember::Group(_) => {}
             }
         }
-    }
-
-    pub(crate) fn error(&self) -> Option<&BuildError> {
-        self.error.as_ref()
     }
 
     fn path(&self, instance: usize) -> Vec<u32> {
@@ -101,8 +91,7 @@ impl SceneBuilder {
     ///
     /// A child that does not exist is an error of [`SceneBuilder::build`].
     pub fn add_group(&mut self, children: impl IntoIterator<Item = (GroupMember, DAffine3)>) -> usize {
-        let groups = self.groups_mut();
-        let count = groups.groups.len();
+        let count = self.groups_mut().groups.len();
         let mut group = Group { children: Vec::new(), ends: Vec::new() };
         let mut end = 0u64;
         for (child, transform) in children {
@@ -110,14 +99,14 @@ impl SceneBuilder {
             if let GroupMember::Group(g) = child
                 && g >= count
             {
-                groups.fail(BuildError::NoSuchGroup { group: g, count });
+                self.fail(BuildError::NoSuchGroup { group: g, count });
                 continue;
             }
-            end = end.saturating_add(groups.size(child));
+            end = end.saturating_add(self.groups_mut().size(child));
             group.children.push((child, transform));
             group.ends.push(end);
         }
-        groups.groups.push(group);
+        self.groups_mut().groups.push(group);
         count
     }
 
@@ -147,22 +136,24 @@ impl SceneBuilder {
     /// ```
     pub fn add_instances_of(&mut self, group: usize, transform: DAffine3) -> Range<usize> {
         let first = self.placed().len();
-        let (count, groups) = (self.groups_mut().groups.len(), self.groups_mut());
+        let groups = self.groups_mut();
+        let count = groups.groups.len();
         if group >= count {
-            groups.fail(BuildError::NoSuchGroup { group, count });
+            self.fail(BuildError::NoSuchGroup { group, count });
             return first..first;
         }
         // Groups of groups grow quickly: counted before they are made.
         let size = groups.size(GroupMember::Group(group));
         if let Err(error) = limit("instances", size.saturating_add(first as u64)) {
-            groups.fail(error);
+            self.fail(error);
             return first..first;
         }
         let mut new = Vec::new();
         if new.try_reserve_exact(size as usize).is_err() {
-            groups.fail(BuildError::TooMany { what: "instances", count: size, limit: 0 });
+            self.fail(BuildError::TooMany { what: "instances", count: size, limit: 0 });
             return first..first;
         }
+        let groups = self.groups_mut();
         groups.place(group, transform, &mut new);
         let range = first..first + new.len();
         groups.placed.push((range.clone(), group));

@@ -904,33 +904,22 @@ fn near_one<'a>(boxes: &'a [Aabb<f32>], bounds: &Aabb<f64>) -> Cow<'a, [Aabb<f32
     boxes.iter().map(|b| Aabb::new(b.min * k, b.max * k)).collect()
 }
 
-/// How many primitives it has that are no triangles.
-fn count(geometry: &Geometry) -> u32 {
-    match geometry {
-        Geometry::Triangles { .. } => 0,
-        Geometry::Shape(_) => 1,
-        Geometry::User(user) => user.count(),
-    }
-}
-
 /// Everything finite, in range and countable.
-/// How many primitives of each are no triangles: what is the user's own is asked once.
+/// How many primitives each has: what is the user's own is asked once.
 fn check(mesh: usize, geometries: &[Geometry]) -> Result<Vec<u32>, BuildError> {
-    let counts: Vec<u32> = geometries.iter().map(count).collect();
-    let of = |(g, &other): (&Geometry, &u32)| match g {
-        Geometry::Triangles { triangles, .. } => triangles.len() as u64,
-        _ => other.into(),
-    };
-    limit("primitives of a mesh", geometries.iter().zip(&counts).map(of).sum())?;
+    let counts: Vec<u64> = geometries.iter().map(Geometry::count).collect();
+    limit("primitives of a mesh", counts.iter().sum())?;
     limit("geometries of a mesh", geometries.len() as u64)?;
-    for (geometry, (g, &other)) in geometries.iter().zip(&counts).enumerate() {
+    // What is within the limit is a number of 32 bits.
+    let counts: Vec<u32> = counts.into_iter().map(|count| count as u32).collect();
+    for (geometry, (g, &count)) in geometries.iter().zip(&counts).enumerate() {
         let Geometry::Triangles { positions, triangles } = g else {
             let unusable = |i: &u32| {
                 let Geometry::User(user) = g else { return false };
                 let bounds = user.bounds(*i);
                 bounds.is_empty() || bounds.min.is_nan() || bounds.max.is_nan()
             };
-            if let Some(primitive) = (0..other).find(unusable) {
+            if let Some(primitive) = (0..count).find(unusable) {
                 return Err(BuildError::UnusableBounds { mesh, geometry, primitive });
             }
             continue;

@@ -47,10 +47,5 @@ impl<'a> Progress<'a> {
 
 /// Of no mesh is it nothing.
 fn size(mesh: &[Geometry]) -> u64 {
-    let of = |g: &Geometry| match g {
-        Geometry::Triangles { triangles, .. } => triangles.len() as u64,
-        Geometry::Shape(_) => 1,
-        Geometry::User(user) => u64::from(user.count()),
-    };
-    1 + mesh.iter().map(of).sum::<u64>()
+    1 + mesh.iter().map(Geometry::count).sum::<u64>()
 }

@@ -81,7 +81,7 @@ impl Mesh {
     /// From the mesh as it is stored to the world, with a mask.
     pub(crate) fn placed(&self) -> impl Iterator<Item = (DAffine3, u32)> + '_ {
         let origin = DAffine3::from_translation(self.origin);
-        self.places.iter().map(move |(m, mask)| (if *m == DAffine3::IDENTITY { origin } else { *m * origin }, *mask))
+        self.places.iter().map(move |(m, mask)| (*m * origin, *mask))
     }
 
     pub(crate) fn geometry(&self) -> Geometry {

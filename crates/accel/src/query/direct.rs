@@ -7,6 +7,7 @@ use core::ops::ControlFlow;
 use firsthit_geometry::{Precision, Ray};
 
 use super::{Any, Closest, Collect, Collector};
+use crate::instance::Instance;
 use crate::kernel::{Double, Exact, Fast, Guarded, Kernel, Robust};
 use crate::layout::compact8::Compact8;
 use crate::layout::wide8::Wide8;
@@ -502,12 +503,16 @@ impl Inner {
         work.anywhere::<T>()
     }
 
+    /// The only instance of a scene.
+    #[inline(always)]
+    fn single(&self) -> Option<&Instance> {
+        let [instance] = &self.instances[..] else { return None };
+        instance.shown.then_some(instance)
+    }
+
     #[inline(always)]
     fn only(&self) -> Option<(Available, Only<'_, Wide8>)> {
-        let [instance] = &self.instances[..] else { return None };
-        if !instance.shown {
-            return None;
-        }
+        let instance = self.single()?;
         let model = &self.models[instance.model as usize];
         let (tree, level) = model.wide()?;
         Some((level, Only { model, tree, transform: &instance.transform }))
@@ -528,10 +533,7 @@ impl Inner {
     /// The same of a compact tree.
     #[inline(always)]
     fn only_compact(&self) -> Option<(Available, Only<'_, Compact8>)> {
-        let [instance] = &self.instances[..] else { return None };
-        if !instance.shown {
-            return None;
-        }
+        let instance = self.single()?;
         let model = &self.models[instance.model as usize];
         let (tree, level) = model.compact()?;
         Some((level, Only { model, tree, transform: &instance.transform }))
