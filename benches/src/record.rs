@@ -82,6 +82,19 @@ impl<R: Serialize> Record<R> {
         )
     }
 
+    fn json(&self) -> io::Result<String> {
+        Ok(serde_json::to_string_pretty(self)? + "\n")
+    }
+
+    /// Writes it as JSON.
+    ///
+    /// # Errors
+    /// When that cannot be done: with the name of the file.
+    pub fn write_json(&self, file: &Path) -> Result<(), String> {
+        let written = self.json().and_then(|text| fs::write(file, text));
+        written.map_err(|e| format!("{}: {e}", file.display()))
+    }
+
     /// Writes PREFIXDATE.json and PREFIXDATE.md into a folder, and says where; a second record of a day has a letter
     /// behind it.
     ///
@@ -94,7 +107,7 @@ impl<R: Serialize> Record<R> {
         let stem = stems.into_iter().find(|s| !path(s, "json").exists()).unwrap_or_else(|| date.clone());
         let files = [path(&stem, "json"), path(&stem, "md")];
         fs::create_dir_all(folder)?;
-        fs::write(&files[0], serde_json::to_string_pretty(self)? + "\n")?;
+        fs::write(&files[0], self.json()?)?;
         fs::write(&files[1], markdown)?;
         Ok(files)
     }

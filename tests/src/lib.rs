@@ -43,3 +43,20 @@ pub fn summary(text: &str) {
         let _ = file.write_all(format!("{text}\n").as_bytes());
     }
 }
+
+/// The fields of a line of CSV: those with commas are in quotes, their quotes doubled.
+#[must_use]
+pub fn csv_fields(line: &str) -> Vec<String> {
+    let (mut fields, mut field, mut quoted) = (Vec::new(), String::new(), false);
+    let mut chars = line.chars().peekable();
+    while let Some(c) = chars.next() {
+        match c {
+            '"' if quoted && chars.peek() == Some(&'"') => field.extend(chars.next()),
+            '"' => quoted = !quoted,
+            ',' if !quoted => fields.push(std::mem::take(&mut field)),
+            c => field.push(c),
+        }
+    }
+    fields.push(field);
+    fields
+}

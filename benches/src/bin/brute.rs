@@ -109,9 +109,7 @@ fn all(args: Args) -> Result<u64, String> {
     let wrong = rows.iter().map(|r| r.wrong).sum();
     if let Some(file) = args.json {
         notes.push(format!("Seed {}; of 2000 queries one is put to all triangles without a sieve.", plan.seed));
-        let record = Record::new(1, 1, notes, rows);
-        let text = serde_json::to_string_pretty(&record).map_err(|e| e.to_string())?;
-        std::fs::write(&file, text + "\n").map_err(|e| format!("{}: {e}", file.display()))?;
+        Record::new(1, 1, notes, rows).write_json(&file)?;
     }
     Ok(wrong)
 }

@@ -48,9 +48,7 @@ fn run(args: Args) -> Result<(), String> {
     }
     print!("{}", table(&rows));
     if let Some(file) = args.json {
-        let record = Record::new(1, args.reps.into(), args.note, rows);
-        let text = serde_json::to_string_pretty(&record).map_err(|e| e.to_string())?;
-        std::fs::write(&file, text + "\n").map_err(|e| format!("{}: {e}", file.display()))?;
+        Record::new(1, args.reps.into(), args.note, rows).write_json(&file)?;
     }
     Ok(())
 }

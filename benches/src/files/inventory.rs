@@ -57,7 +57,7 @@ fn is_model(name: &str) -> bool {
 
 /// The rows of an inventory.
 fn table(text: &str, triangles: &str) -> io::Result<Vec<(String, Known)>> {
-    let mut lines = text.lines().map(fields);
+    let mut lines = text.lines().map(firsthit_tests::csv_fields);
     let head = lines.next().unwrap_or_default();
     let column = |name: &str| head.iter().position(|h| h == name);
     let missing = || io::Error::other("an inventory lacks a column");
@@ -73,22 +73,6 @@ fn table(text: &str, triangles: &str) -> io::Result<Vec<(String, Known)>> {
         (cell(file), known)
     });
     Ok(rows.collect())
-}
-
-/// The fields of a line of CSV: those with commas are in quotes, their quotes doubled.
-fn fields(line: &str) -> Vec<String> {
-    let (mut fields, mut field, mut quoted) = (Vec::new(), String::new(), false);
-    let mut chars = line.chars().peekable();
-    while let Some(c) = chars.next() {
-        match c {
-            '"' if quoted && chars.peek() == Some(&'"') => field.extend(chars.next()),
-            '"' => quoted = !quoted,
-            ',' if !quoted => fields.push(std::mem::take(&mut field)),
-            c => field.push(c),
-        }
-    }
-    fields.push(field);
-    fields
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! The command line of the files program.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -86,10 +86,10 @@ fn run(args: &Args) -> Result<bool, Error> {
 
 fn write(args: &Args, record: &Record<Row>) -> Result<(), Error> {
     if let Some(path) = &args.json {
-        save(path, &(serde_json::to_string_pretty(record)? + "\n"))?;
+        record.write_json(path)?;
     }
     if let Some(path) = &args.markdown {
-        save(path, &page::page(record))?;
+        fs::write(path, page::page(record)).map_err(|e| format!("{}: {e}", path.display()))?;
     }
     if let Some(folder) = &args.render {
         let pictures = record.rows.iter().filter_map(|r| Some((r.file.clone(), r.picture.as_ref()?)));
@@ -97,8 +97,4 @@ fn write(args: &Args, record: &Record<Row>) -> Result<(), Error> {
         println!("{} sheets", sheet::write(folder, &made.collect::<Vec<_>>())?);
     }
     Ok(())
-}
-
-fn save(path: &Path, text: &str) -> Result<(), Error> {
-    fs::write(path, text).map_err(|e| format!("{}: {e}", path.display()).into())
 }
