@@ -1,8 +1,11 @@
 //! Inside and outside are told alike by all methods where they apply, and winding numbers are those of the slow twin.
 
-use firsthit_accel::{BuildOptions, Geometry, Layout, SceneBuilder, SignMethod, Solid, reference};
-use firsthit_geometry::Precision;
-use firsthit_tests::oracle::read_obj;
+use std::collections::HashSet;
+
+use firsthit_accel::{BuildOptions, Crossings, Geometry, Layout, SceneBuilder, SignMethod, Solid, reference};
+use firsthit_geometry::{Precision, Ray};
+use firsthit_measure::mesh::bumpy_sphere;
+use firsthit_tests::oracle::{Aim, Mesh, Rng, icosphere, read_obj, soup};
 use glam::{DAffine3, DVec3, Vec3};
 use proptest::prelude::*;
 
@@ -101,6 +104,9 @@ proptest! {
             // Close to a sheet it changes by 1.
             if scene.distance(p) > 1e-6 * bounds.extent().max_element() {
                 prop_assert!((got - expected).abs() < 1e-6, "{} {}", got, expected);
+                if (expected.abs() - 0.5).abs() > 1e-6 {
+                    prop_assert_eq!(solid.contains(p), expected.abs() > 0.5, "{}", expected);
+                }
             }
         }
     }
@@ -178,6 +184,106 @@ fn the_open_bunny() {
     firsthit_tests::summary(&format!(
         "winding numbers of the open bunny: {count} points, {inside} inside; fast: {worst:.4} off at most"
     ));
+}
+
+/// The edges that one triangle has and no other in the opposite direction.
+fn border(mesh: &Mesh) -> Vec<[DVec3; 2]> {
+    let edges = mesh.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+    let all: HashSet<[u32; 2]> = edges.clone().collect();
+    let open = edges.filter(|[a, b]| !all.contains(&[*b, *a]));
+    open.map(|edge| edge.map(|i| mesh.positions[i as usize].as_dvec3())).collect()
+}
+
+/// Sides are told without summing all edges of the border: as the sum over all triangles says, in the volume and at all distances
+/// from the border, of one loop and of many.
+#[test]
+fn sides_of_open_meshes_are_those_of_all_their_triangles() {
+    let mut rng = Rng(3);
+    let mut halved = icosphere(4);
+    halved.triangles.retain(|t| t.iter().map(|&i| halved.positions[i as usize].z).sum::<f32>() < 1.0);
+    let mut pierced = bumpy_sphere(4);
+    let mut index = 0;
+    pierced.triangles.retain(|_| {
+        index += 1;
+        index % 5 != 0 && !(300..700).contains(&index)
+    });
+    let mut meshes = vec![halved, pierced, soup(&mut rng, 300)];
+    if let Some(shared) = firsthit_tests::shared() {
+        meshes.push(read_obj(&shared.join("assets/stanford-bunny/stanford-bunny.obj")).expect("the bunny"));
+    }
+    for mesh in &meshes {
+        let border = border(mesh);
+        let points = if mesh.triangles.len() > 10_000 { 200 } else { 4000 };
+        for place in [DAffine3::IDENTITY, DAffine3::from_scale(DVec3::new(-1.0, 2.0, 0.4))] {
+            let mut builder = SceneBuilder::default();
+            let placed = builder.add_mesh(vec![triangles(mesh)]);
+            builder.add_instance(placed, place);
+            let scene = builder.build().expect("a mesh");
+            let solid = Solid::with_method(&scene, SignMethod::Winding);
+            let (bounds, size) = (scene.bounds(), scene.bounds().extent().max_element());
+            let (mut sides, mut left) = ([0, 0], 0);
+            for k in 0..points {
+                let p = if k % 4 == 0 {
+                    bounds.center() + rng.in_cube() * bounds.extent() * 0.6
+                } else {
+                    let [a, b] = border[rng.below(border.len())];
+                    let off = rng.in_cube() * size * 10f64.powi(-(rng.below(10) as i32));
+                    place.transform_point3(a.lerp(b, rng.unit())) + off
+                };
+                let expected = reference::winding_number(&scene, p).abs();
+                if (expected - 0.5).abs() < 1e-7 {
+                    left += 1;
+                    continue;
+                }
+                assert_eq!(solid.contains(p), expected > 0.5, "{p}: {expected}");
+                sides[usize::from(expected > 0.5)] += 1;
+            }
+            assert!(sides[0] > points / 5 && left < points / 50, "{sides:?} {left}");
+            firsthit_tests::summary(&format!(
+                "sides of an open mesh of {} triangles, {} edges of its border: {sides:?} outside and inside",
+                mesh.triangles.len(),
+                border.len()
+            ));
+        }
+    }
+}
+
+/// Beside edges and corners, where the neighbours' distances are rounded apart, the side is that of exact crossings.
+#[test]
+fn pseudonormals_see_all_neighbours_beside_the_surface() {
+    let (mut rng, mut asked) = (Rng(41), 0);
+    let middle = DVec3::new(41.4, -70.0, -223.1);
+    let mesh = bumpy_sphere(3).map(|p| (p.as_dvec3() * 200.0 + middle).as_vec3());
+    let mut builder = SceneBuilder::default();
+    let placed = builder.add_mesh(vec![triangles(&mesh)]);
+    builder.add_instance(placed, DAffine3::IDENTITY);
+    let scene = builder.build().expect("a mesh");
+    let solid = Solid::with_method(&scene, SignMethod::Pseudonormal);
+    for k in 0..6000 {
+        let on = Aim::ALL[k % 3].point(mesh.corners(rng.below(mesh.triangles.len())), &mut rng);
+        let p = on + rng.in_cube() * 10f64.powi(-(rng.below(12) as i32));
+        // What is nearer cannot be told: the size is some 400.
+        if scene.distance(p) > 1e-12 {
+            let ray = Ray::new(p, rng.direction());
+            let inside = reference::exact_crossings(&scene, &ray, Crossings::Surfaces).len() % 2 == 1;
+            assert_eq!(solid.contains(p), inside, "{p} at {:e}", scene.distance(p));
+            asked += 1;
+        }
+    }
+    assert!(asked > 5000, "{asked}");
+}
+
+/// Found by brute force: 5e-11 away, where the triangle on the other side of the nearest edge is farther by a millionth of that.
+#[test]
+fn pseudonormals_of_nefertiti_beside_an_edge() {
+    let Some(shared) = firsthit_tests::shared() else { return };
+    let path = shared.join("assets/nefertiti/nefertiti.obj.zst");
+    let desc = firsthit_import::open(&path, &firsthit_import::Options::default()).expect("nefertiti").scene;
+    let scene = SceneBuilder::from_desc(&desc, BuildOptions::default()).build().expect("nefertiti");
+    let p = DVec3::new(41.363_300_323_502_656, -69.958_499_908_490_6, -223.135_002_136_210_9);
+    for method in [SignMethod::Exact, SignMethod::Pseudonormal] {
+        assert!(!Solid::with_method(&scene, method).contains(p), "{method:?}");
+    }
 }
 
 /// An open quad, bent.

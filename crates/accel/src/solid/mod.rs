@@ -2,6 +2,7 @@
 
 mod boundary;
 mod clusters;
+mod loops;
 mod pseudonormal;
 
 use core::f64::consts::PI;
@@ -12,6 +13,7 @@ use firsthit_geometry::Ray;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use crate::instance::Instance;
 use crate::kernel::{Exact, Robust};
 use crate::model::{Model, Surface};
 use crate::query::{Collect, Dyn, Take};
@@ -20,12 +22,13 @@ use crate::stats::Off;
 use crate::{Hit, Scene};
 use boundary::Boundary;
 use clusters::Clusters;
+use loops::{Placed, Viewpoint};
 
 /// How inside is told from outside.
 ///
 /// | method | needs | wrong where | cost |
 /// |---|---|---|---|
-/// | `Winding` | triangles that agree about what is outside | where they do not; holes are closed by what the number makes of them | a ray, and a sum over the edges at holes |
+/// | `Winding` | triangles that agree about what is outside | where they do not; holes are closed by what the number makes of them | a ray, and as many of the edges at holes as it takes to tell |
 /// | `FastWinding` | the same | there too, and close to the surface of open meshes, where the number is near one half | some hundred terms |
 /// | `Parity` | closed meshes, of any orientation | bodies that overlap | a ray for each vote |
 /// | `Pseudonormal` | closed, oriented meshes that do not cut themselves | elsewhere | none beside the distance |
@@ -87,6 +90,8 @@ pub struct Solid {
     method: SignMethod,
     /// By model.
     boundaries: Vec<Arc<Boundary>>,
+    /// Of each instance that has any.
+    loops: Vec<Placed>,
     /// By model, where the method needs them.
     clusters: Vec<Arc<Clusters>>,
 }
@@ -102,8 +107,8 @@ impl Solid {
     pub fn new(scene: &Scene) -> Self {
         let boundaries = boundaries(scene);
         let all = |f: fn(&Boundary) -> bool| boundaries.iter().all(|b| f(b));
-        let edges: usize = scene.shown().map(|(_, i)| boundaries[i.model as usize].edges.len()).sum();
-        let method = if all(|b| b.edges.is_empty()) {
+        let edges: usize = scene.shown().map(|(_, i)| boundaries[i.model as usize].edges).sum();
+        let method = if all(|b| b.edges == 0) {
             SignMethod::Winding
         } else if all(|b| b.closed) {
             SignMethod::Parity { votes: 1 }
@@ -128,7 +133,10 @@ impl Solid {
             }
             _ => Vec::new(),
         };
-        Self { scene: scene.clone(), method, boundaries, clusters }
+        let open = scene.shown().filter(|(_, i)| boundaries[i.model as usize].edges > 0);
+        let placed = |(_, i): (u32, &Instance)| Placed::new(boundaries[i.model as usize].loops.clone(), &i.transform);
+        let loops = open.map(placed).collect();
+        Self { scene: scene.clone(), method, boundaries, loops, clusters }
     }
 
     /// The method that is used.
@@ -152,7 +160,7 @@ impl Solid {
     /// Number of edges at which the surfaces of the meshes end, or at which neighbours disagree about what is outside.
     #[must_use]
     pub fn boundary_edges(&self) -> usize {
-        self.boundaries.iter().map(|b| b.edges.len()).sum()
+        self.boundaries.iter().map(|b| b.edges).sum()
     }
 
     /// Whether the point is inside; false for one that is not finite. On the surface it is either.
@@ -162,7 +170,8 @@ impl Solid {
             return false;
         }
         match self.method {
-            SignMethod::Winding | SignMethod::FastWinding { .. } => self.winding_number(point).abs() > 0.5,
+            SignMethod::Winding => self.is_wound_around(point),
+            SignMethod::FastWinding { .. } => self.winding_number(point).abs() > 0.5,
             SignMethod::Parity { votes } => {
                 let votes = votes.max(1);
                 let inside = (0..votes).filter(|&k| self.crossings(&self.ray(point, k)).count % 2 == 1).count();
@@ -225,31 +234,43 @@ impl Solid {
             return f64::NAN;
         }
         if let SignMethod::FastWinding { accuracy } = self.method {
-            let of = |(i, clusters): (&crate::instance::Instance, &Arc<Clusters>)| {
-                clusters.winding_number(&i.transform, point, accuracy)
-            };
+            let of =
+                |(i, clusters): (&Instance, &Arc<Clusters>)| clusters.winding_number(&i.transform, point, accuracy);
             return self.of_instances(&self.clusters).map(of).sum();
         }
-        if self.boundaries.iter().all(|b| b.edges.is_empty()) {
+        if self.loops.is_empty() {
             return self.crossings(&self.ray(point, 0)).signed as f64;
         }
-        let size = self.scene.bounds().extent().max_element();
-        // Where a ray passes an edge closely, another one is taken.
-        for vote in 0..ATTEMPTS {
-            let ray = self.ray(point, vote);
-            let angles = self
-                .of_instances(&self.boundaries)
-                .map(|(instance, boundary)| boundary.solid_angle(&instance.transform, point, -ray.direction, size));
-            if let Some(open) = angles.sum::<Option<f64>>() {
-                return self.crossings(&ray).signed as f64 + open / (4.0 * PI);
-            }
-        }
+        let of_loops = |ray: &Ray<f64>, from: Viewpoint| {
+            let open = from.sum(&self.loops)?;
+            Some(self.crossings(ray).signed as f64 + open / (4.0 * PI))
+        };
         // On an edge, as far as can be told: the sum that needs no ray.
-        crate::reference::winding_number(&self.scene, point)
+        self.attempts(point, of_loops).unwrap_or_else(|| crate::reference::winding_number(&self.scene, point))
+    }
+
+    /// Whether the winding number is beyond one half: of loops far away not every edge has to be looked at.
+    fn is_wound_around(&self, point: DVec3) -> bool {
+        if self.loops.is_empty() {
+            return self.crossings(&self.ray(point, 0)).signed != 0;
+        }
+        let of_loops =
+            |ray: &Ray<f64>, from: Viewpoint| from.is_beyond_half(&self.loops, self.crossings(ray).signed as f64);
+        let beyond = self.attempts(point, of_loops);
+        beyond.unwrap_or_else(|| crate::reference::winding_number(&self.scene, point).abs() > 0.5)
+    }
+
+    /// What is told by a ray from the point that passes no edge of a loop closely: where one does, another one is taken.
+    fn attempts<T>(&self, point: DVec3, tell: impl Fn(&Ray<f64>, Viewpoint) -> Option<T>) -> Option<T> {
+        let size = self.scene.bounds().extent().max_element();
+        (0..ATTEMPTS).find_map(|vote| {
+            let ray = self.ray(point, vote);
+            tell(&ray, Viewpoint::new(point, ray.direction, size))
+        })
     }
 
     /// Each instance with what belongs to its model.
-    fn of_instances<'a, T>(&'a self, of: &'a [T]) -> impl Iterator<Item = (&'a crate::instance::Instance, &'a T)> {
+    fn of_instances<'a, T>(&'a self, of: &'a [T]) -> impl Iterator<Item = (&'a Instance, &'a T)> {
         self.scene.shown().filter_map(|(_, i)| Some((i, of.get(i.model as usize)?)))
     }
 

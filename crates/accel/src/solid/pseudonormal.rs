@@ -8,15 +8,18 @@ use crate::model::Model;
 use crate::nearest::{Keep, Near};
 
 /// Keeps what may be nearest: what shares the nearest edge or vertex is as near, but for rounding.
-#[derive(Default)]
 struct Ties {
     nearest: Option<Near>,
     all: Vec<Near>,
+    /// By how much the distances may be off. What is kept too much does no harm: it does not share the vertices.
+    room: f64,
 }
 
 impl Keep for Ties {
     fn limit(&self) -> f64 {
-        self.nearest.map_or(f64::INFINITY, |near| near.squared * (1.0 + 1e-9))
+        let Some(near) = self.nearest else { return f64::INFINITY };
+        let distance = near.squared.sqrt() * (1.0 + 1e-9) + self.room;
+        distance * distance
     }
     fn offer(&mut self, near: Near) {
         if self.nearest.is_none_or(|nearest| near.comes_before(&nearest)) {
@@ -32,7 +35,10 @@ impl Keep for Ties {
 
 /// Whether a point is behind what is nearest to it.
 pub(super) fn is_inside(scene: &Scene, point: DVec3) -> bool {
-    let mut ties = Ties::default();
+    // Beside the surface distances are no sharper than places, as seen from the point; within needles less than that.
+    let bounds = scene.bounds();
+    let farthest = (point - bounds.min).abs().max((point - bounds.max).abs()).max_element();
+    let mut ties = Ties { nearest: None, all: Vec::new(), room: farthest * 2f64.powi(-40) };
     scene.inner().near(point, &mut ties);
     // From beyond all numbers everything is equally far.
     let Some(nearest) = ties.nearest.filter(|near| near.squared.is_finite()) else { return false };
