@@ -1,6 +1,6 @@
 //! Single rays take a shorter way at the tiers that are asked most: the same bits as the way of all queries.
 
-use firsthit_accel::{BuildOptions, Geometry, Layout, Level, Scene, SceneBuilder};
+use firsthit_accel::{BuildOptions, Crossings, Geometry, Layout, Level, Scene, SceneBuilder};
 use firsthit_geometry::{Precision, Ray};
 use glam::{DAffine3, DQuat, DVec3, Vec3};
 use proptest::prelude::*;
@@ -111,6 +111,10 @@ fn same(scene: &Scene, ray: &Ray<f64>) -> Result<(), TestCaseError> {
     if scene.options().precision == Precision::Robust {
         prop_assert_eq!(hits.map(|h| bits(&h)), [bits(&single); 8], "{:?} {:?}", scene.options(), ray);
         prop_assert_eq!(any, [single.is_some(); 8], "{:?} {:?}", scene.options(), ray);
+    }
+    for crossings in [Crossings::Triangles, Crossings::Surfaces] {
+        let (count, all) = (scene.count_hits(ray, crossings), scene.all_hits(ray, crossings));
+        prop_assert_eq!(count as usize, all.len(), "{:?} {:?} {:?}", scene.options(), ray, crossings);
     }
     Ok(())
 }

@@ -9,7 +9,7 @@ use super::{Collect, Crossings, Take, batch::CHUNK};
 use crate::{Hit, HitId, Scene};
 
 /// Counts the hits.
-struct Count(u32);
+pub(super) struct Count(pub(super) u32);
 
 impl Take for Count {
     #[inline(always)]
@@ -27,7 +27,11 @@ impl Scene {
     /// too (at the tiers but `Fast`).
     #[must_use]
     pub fn count_hits(&self, ray: &Ray<f64>, crossings: Crossings) -> u32 {
-        self.count_hits_filtered(ray, crossings, None, |_| true)
+        let mut count = 0;
+        if !self.inner().tally(core::slice::from_ref(ray), crossings, core::slice::from_mut(&mut count)) {
+            count = self.count_hits_filtered(ray, crossings, None, |_| true);
+        }
+        count
     }
 
     /// As [`Scene::count_hits`], of the hits that `accept` accepts, other than on the flat primitive `source`. `accept`
@@ -49,8 +53,10 @@ impl Scene {
 
     /// [`Scene::count_hits`] for each ray, into the slot of the same index. The shorter slice decides how many.
     pub fn count_hits_each(&self, rays: &[Ray<f64>], crossings: Crossings, counts: &mut [u32]) {
-        for (ray, count) in rays.iter().zip(counts) {
-            *count = self.count_hits(ray, crossings);
+        if !self.inner().tally(rays, crossings, counts) {
+            for (ray, count) in rays.iter().zip(counts) {
+                *count = self.count_hits_filtered(ray, crossings, None, |_| true);
+            }
         }
     }
 

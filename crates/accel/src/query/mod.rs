@@ -11,6 +11,7 @@ mod decision;
 mod direct;
 mod first_hits;
 mod nearest_k;
+mod tally;
 
 use core::ops::ControlFlow;
 

@@ -1,0 +1,153 @@
+//! How many hits rays have in a scene of one instance, at the tier that is asked most: compiled for itself alone, for all
+//! rays of a call.
+
+use core::ops::ControlFlow;
+
+use firsthit_geometry::transform::Transform;
+use firsthit_geometry::{Precision, Ray};
+use glam::Vec3;
+
+use super::count_hits::Count;
+use super::{Collect, Crossings};
+use crate::Guards;
+use crate::kernel::{MOST, Robust, Short, careful_plane, short_plane};
+use crate::layout::wide8::Wide8;
+use crate::local::{Line, LocalRay};
+use crate::model::Model;
+use crate::offer::{OfferTriangle, within_triangle};
+use crate::scene::{Inner, is_interval};
+use crate::simd::{self, Available, Lanes, Work};
+use crate::stats::Off;
+use crate::wide::{self, Boxes, Sheared, Visit, WideTree, in_lanes};
+
+impl Inner {
+    /// Counts the hits of each ray; `false` where this is no such scene, and nothing is done.
+    pub(super) fn tally(&self, rays: &[Ray<f64>], crossings: Crossings, counts: &mut [u32]) -> bool {
+        // One guard is for rays that leave surfaces.
+        let guarded = self.options.guards.contains(Guards::ALL.difference(Guards::OFFSET));
+        let [instance] = &self.instances[..] else { return false };
+        let model = &*self.models[instance.model as usize];
+        let Some((tree, level)) = model.wide() else { return false };
+        if self.options.precision != Precision::Robust || !guarded || !instance.shown {
+            return false;
+        }
+        let only = Only { model, tree, transform: &instance.transform, surfaces: crossings == Crossings::Surfaces };
+        run(level, Tally { only, rays, counts });
+        true
+    }
+}
+
+/// Once for all callers.
+#[inline(never)]
+fn run(level: Available, tally: Tally<'_>) {
+    simd::run(level, tally);
+}
+
+/// What is asked.
+#[derive(Clone, Copy)]
+struct Only<'a> {
+    model: &'a Model,
+    tree: &'a Wide8,
+    transform: &'a Transform,
+    /// Each crossing once.
+    surfaces: bool,
+}
+
+/// The counts of some rays. The shorter slice decides how many.
+struct Tally<'a> {
+    only: Only<'a>,
+    rays: &'a [Ray<f64>],
+    counts: &'a mut [u32],
+}
+
+impl Work for Tally<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let Self { only, rays, counts } = self;
+        for (ray, count) in rays.iter().zip(counts) {
+            *count = only.count::<L>(ray);
+        }
+    }
+}
+
+impl Only<'_> {
+    #[inline(always)]
+    fn count<L: Lanes>(self, ray: &Ray<f64>) -> u32 {
+        let Some(local) = LocalRay::enter(ray, self.transform, self.model.extent()).filter(|_| is_interval(ray)) else {
+            return 0;
+        };
+        let boxes = Boxes::<L>::of(local.origin32, local.direction32, local.delta);
+        let filter: Sheared<L> =
+            Sheared::new(in_lanes(local.origin32), in_lanes(local.direction32), 0.0, 2.0 * local.delta);
+        let interval = [local.box_t_min(ray.t_min), local.box_t_max(ray.t_max)];
+        let (line, from, unscale) = (local.line(), local.t_min, local.t_unscale);
+        let mut visitor = Counter { only: self, ray, line, from, unscale, count: 0 };
+        // It never breaks.
+        let _ = wide::traverse::<L, _, _, Off, false>(self.tree, &boxes, interval, &filter, &mut Off, &mut visitor);
+        visitor.count
+    }
+
+    // What is rare. By value: what is passed by reference has to be kept in memory by the caller, always.
+
+    /// The hits of one triangle by the tier's kernel: at most one.
+    #[cold]
+    #[inline(never)]
+    fn unclear(self, ray: Ray<f64>, place: usize, known: [f32; 3]) -> u32 {
+        let triangle = WideTree::triangle(self.tree, place);
+        if !self.surfaces {
+            return u32::from(self.model.hit_of_one::<Robust>(&ray, self.transform, place, &triangle, known).is_some());
+        }
+        let Some(local) = LocalRay::enter(&ray, self.transform, self.model.extent()) else { return 0 };
+        let mut count = Collect::new(&ray, None, |_| true, Count(0));
+        let mut offer = OfferTriangle::<true, Robust>::new(self.model, &local, 0, &count);
+        let _ = offer.offer(place, &triangle, Some(known), &mut count, &mut Off);
+        count.take.0
+    }
+}
+
+/// Where the plane of a triangle is met, with all digits; `None` where that is nowhere.
+#[inline(never)]
+fn careful<const GRAZED: bool>(triangle: [Vec3; 3], line: Line) -> Option<f64> {
+    let plane = careful_plane(triangle, line, GRAZED)?;
+    if GRAZED { within_triangle(line, plane.t, triangle) } else { Some(plane.t) }
+}
+
+/// Counts the triangles in the interval.
+struct Counter<'a> {
+    only: Only<'a>,
+    ray: &'a Ray<f64>,
+    line: Line,
+    /// Start of the interval, local.
+    from: f64,
+    /// From local parameters to the world's.
+    unscale: f64,
+    count: u32,
+}
+
+impl Visit<Off> for Counter<'_> {
+    #[inline(always)]
+    fn visit(&mut self, place: usize, known: [f32; 3], _: &mut Off) -> ControlFlow<(), Option<f32>> {
+        // As `Weights::told`, without its division. Where an edge function is 0 a rule tells whose the crossing is.
+        let [e0, e1, e2] = known;
+        let (sum, least) = ((e0 + e1 + e2).abs(), e0.abs().min(e1.abs()).min(e2.abs()));
+        if !((1e-36..=1e36).contains(&sum) & (least > 0.0)) {
+            self.count += self.only.unclear(*self.ray, place, known);
+            return ControlFlow::Continue(None);
+        }
+        let triangle = WideTree::triangle(self.only.tree, place);
+        let t = match short_plane(&triangle, &self.line, MOST, self.from) {
+            Short::Met(plane) => Some(plane.t),
+            Short::Before => return ControlFlow::Continue(None),
+            Short::Grazed => careful::<true>(triangle, self.line),
+            Short::Lost => careful::<false>(triangle, self.line),
+        };
+        match t.map(|t| t * self.unscale) {
+            Some(t) => self.count += u32::from(self.ray.t_min <= t && t <= self.ray.t_max && t.abs() <= f64::MAX),
+            // No crossing may be lost where the plane does not tell.
+            None => self.count += self.only.unclear(*self.ray, place, known),
+        }
+        ControlFlow::Continue(None)
+    }
+}
