@@ -159,6 +159,12 @@ impl Above {
 
 /// For those who walk through the tree themselves.
 impl Above {
+    /// The wide tree, and the numbers of boxes that its runs are of.
+    #[inline(always)]
+    pub(crate) fn wide(&self) -> Option<(&Wide, &[u32])> {
+        if let AboveTree::Wide(wide) = &self.tree { Some((wide, &self.order)) } else { None }
+    }
+
     /// The root, where that is a node.
     pub(crate) fn first(&self) -> Option<u32> {
         match &self.tree {
@@ -285,13 +291,21 @@ impl Frame {
 
 /// Nodes of eight children over runs of boxes.
 #[derive(Clone, Debug)]
-struct Wide {
+pub(crate) struct Wide {
     /// The root first; none where all boxes are in one run.
-    nodes: Vec<Node>,
+    pub(crate) nodes: Vec<Node>,
     /// What a leaf's reference counts.
-    runs: Vec<Range<u32>>,
+    pub(crate) runs: Vec<Range<u32>>,
     frame: Frame,
-    level: Available,
+    pub(crate) level: Available,
+}
+
+impl Wide {
+    /// Middle and scale of the frame, and what is around all boxes there.
+    #[inline(always)]
+    pub(crate) fn frame(&self) -> (DVec3, f64, &Extent) {
+        (self.frame.center, self.frame.scale, &self.frame.extent)
+    }
 }
 
 impl Wide {

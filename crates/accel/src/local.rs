@@ -68,7 +68,12 @@ pub(crate) struct Extent {
     magnitude: f64,
     /// Half the longest side of the box.
     half: f64,
+    /// By how much boxes are met as if larger by rays that start in the cube or just beside it, and by all that are not moved.
+    deltas: [f32; 2],
 }
+
+/// Rays start just beside a cube up to so many of its half sizes from the middle, in each axis.
+const BESIDE: f64 = 1.0625;
 
 impl Extent {
     /// A point at the origin for an object without a box.
@@ -76,14 +81,25 @@ impl Extent {
         if bounds.is_empty() {
             return Self::default();
         }
-        let center = bounds.center();
-        Self { center, magnitude: largest(center), half: half_size(bounds) }
+        let (center, half) = (bounds.center(), half_size(bounds));
+        let magnitude = largest(center);
+        let deltas = [BESIDE, FAR].map(|far| delta((far + 1.0) * half, magnitude, 0.0).to_f32());
+        Self { center, magnitude, half, deltas }
     }
 
     /// Its centre, the largest coordinate of that, and half the longest side.
     #[inline(always)]
     pub(crate) fn parts(&self) -> ([f64; 3], f64, f64) {
         (self.center.to_array(), self.magnitude, self.half)
+    }
+
+    /// How far from the centre rays start, in each axis, that are surely not moved, and those just beside the cube; each with what is not
+    /// below their [`LocalRay::delta`].
+    #[inline(always)]
+    pub(crate) fn bounds_of_rays(&self) -> [(f64, f32); 2] {
+        // A little less, since the sum with the half size is rounded.
+        const LESS: f64 = 1.0 - 4.0 * f64::UNIT_ROUNDOFF;
+        [(FAR * LESS * self.half, self.deltas[1]), (BESIDE * LESS * self.half, self.deltas[0])]
     }
 }
 
@@ -223,7 +239,7 @@ impl LocalRay {
     /// 2^-511 or 2^511: numbers that have no room for products.
     #[inline(always)]
     pub(crate) fn enter(ray: &Ray<f64>, transform: &Transform, object: &Extent) -> Option<Self> {
-        let Extent { center, magnitude, half } = *object;
+        let Extent { center, magnitude, half, .. } = *object;
         let origin = transform.point_to_object(ray.origin);
         let direction = transform.vector_to_object(ray.direction);
         let (length, unit) = scales(largest(direction))?;

@@ -668,20 +668,20 @@ impl Model {
     }
 
     /// The hit of a ray with the triangle at a place of the wide tree, which has passed the filter: with the normal as it
-    /// is in the object's space, and as if of the first instance.
+    /// is in the object's space.
     #[cold]
     #[inline(never)]
     pub(crate) fn hit_of_one<K: Kernel>(
         &self,
         ray: &Ray<f64>,
-        transform: &Transform,
+        (instance, transform): (u32, &Transform),
         place: usize,
         triangle: &[Vec3; 3],
         known: [f32; 3],
     ) -> Option<Hit> {
         let local = LocalRay::enter(ray, transform, &self.extent)?;
         let mut first = Collect::new(ray, None, |_| true, Closest { order: |_, _| false, best: None });
-        let mut offer = OfferTriangle::<false, K>::new(self, &local, 0, &first);
+        let mut offer = OfferTriangle::<false, K>::new(self, &local, instance, &first);
         // It never breaks.
         let _ = offer.offer(place, triangle, Some(known), &mut first, &mut Off);
         first.take.best

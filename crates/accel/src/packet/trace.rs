@@ -260,7 +260,7 @@ impl Group {
     ) -> bool {
         let ray = &among.rays[index][lane];
         let ray = ray.with_interval(ray.t_min, self.t_max[lane]);
-        let Some(hit) = among.model.hit_of_one::<T>(&ray, among.transform, place, triangle, known) else {
+        let Some(hit) = among.model.hit_of_one::<T>(&ray, (0, among.transform), place, triangle, known) else {
             return false;
         };
         self.take_one::<ANY>(among.model, lane, place, (hit.t, hit.u, hit.v), hit.normal_direction)

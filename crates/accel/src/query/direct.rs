@@ -6,6 +6,7 @@ use core::ops::ControlFlow;
 
 use firsthit_geometry::{Precision, Ray};
 
+use super::across::Left;
 use super::{Any, Closest, Collect, Collector};
 use crate::instance::Instance;
 use crate::kernel::{Double, Exact, Fast, Guarded, Kernel, Robust};
@@ -57,23 +58,29 @@ impl Scene {
     /// [`Scene::closest_hit`] of a ray that starts where [`SurfacePoint::spawn`] says on the triangle `source`, and goes away
     /// from it: the same answer, found sooner. That the ray does not meet the triangle that it comes from would take many
     /// digits to tell; here that triangle is not tested (at [`Precision::Robust`], in
-    /// scenes of one instance of the wide layout; in others it is).
+    /// meshes of the wide layout; in others it is).
     ///
     /// [`SurfacePoint::spawn`]: crate::SurfacePoint::spawn
     #[must_use]
     pub fn closest_hit_from(&self, ray: &Ray<f64>, source: HitId) -> Option<Hit> {
-        match self.inner().left(source) {
-            Some((level, only, place)) => simd::run(level, Leaving { only, asked: AskClosest(self), ray, place }),
+        if let Some((level, only, place)) = self.inner().left(source) {
+            return simd::run(level, Leaving { only, asked: AskClosest(self), ray, place });
+        }
+        match self.inner().left_of_several(source) {
             None => self.closest_hit(ray),
+            left => self.closest_across::<Robust>(ray, left),
         }
     }
 
     /// [`Scene::any_hit`] of a ray as for [`Scene::closest_hit_from`].
     #[must_use]
     pub fn any_hit_from(&self, ray: &Ray<f64>, source: HitId) -> bool {
-        match self.inner().left(source) {
-            Some((level, only, place)) => simd::run(level, Leaving { only, asked: AskAny(self), ray, place }),
+        if let Some((level, only, place)) = self.inner().left(source) {
+            return simd::run(level, Leaving { only, asked: AskAny(self), ray, place });
+        }
+        match self.inner().left_of_several(source) {
             None => self.any_hit(ray),
+            left => self.any_across::<Robust>(ray, left),
         }
     }
 }
@@ -87,17 +94,19 @@ pub(crate) trait ForKernel {
 /// Work that has a shorter way in a scene of one instance, at the tiers that are asked most.
 trait Shortest: ForKernel {
     /// In any scene.
-    fn anywhere<K: Kernel>(self) -> Self::Output;
+    fn across<T: Tier>(self) -> Self::Output;
     fn in_wide<T: Tier>(self, level: Available, only: Only<'_, Wide8>) -> Self::Output;
     fn in_compact<T: Tier>(self, level: Available, only: Only<'_, Compact8>) -> Self::Output;
 }
 
 /// What is asked of each ray.
-trait Asked: Copy {
+pub(super) trait Asked: Copy {
     type Answer;
     fn scene(&self) -> &Scene;
     /// In any scene.
     fn anywhere<K: Kernel>(self, ray: &Ray<f64>) -> Self::Answer;
+    /// The same by the shortest way.
+    fn across<T: Tier>(self, ray: &Ray<f64>) -> Self::Answer;
     /// In the only instance.
     fn whole<L: Lanes, K: Kernel>(self, only: &Only<'_, Wide8>, ray: &Ray<f64>) -> Self::Answer;
     /// The same by the shortest way, of a ray that may leave the triangle at a place, which is not tested.
@@ -126,7 +135,7 @@ trait Asked: Copy {
 
 /// The nearest hit.
 #[derive(Clone, Copy)]
-struct AskClosest<'a>(&'a Scene);
+pub(super) struct AskClosest<'a>(pub(super) &'a Scene);
 
 impl Asked for AskClosest<'_> {
     type Answer = Option<Hit>;
@@ -144,6 +153,11 @@ impl Asked for AskClosest<'_> {
         // It never breaks: the nearest hit is known at the end only.
         let _ = scene.inner().trace_by::<false, K, _, _>(ray, &mut closest, &mut Off);
         closest.take.best.map(|hit| scene.finished(hit))
+    }
+
+    #[inline(always)]
+    fn across<T: Tier>(self, ray: &Ray<f64>) -> Option<Hit> {
+        self.0.closest_across::<T>(ray, None)
     }
 
     #[inline(always)]
@@ -189,7 +203,7 @@ impl Asked for AskClosest<'_> {
 
 /// Whether there is a hit.
 #[derive(Clone, Copy)]
-struct AskAny<'a>(&'a Scene);
+pub(super) struct AskAny<'a>(pub(super) &'a Scene);
 
 impl Asked for AskAny<'_> {
     type Answer = bool;
@@ -203,6 +217,11 @@ impl Asked for AskAny<'_> {
     fn anywhere<K: Kernel>(self, ray: &Ray<f64>) -> bool {
         let mut any = Collect::new(ray, None, |_| true, Any);
         self.0.inner().trace_by::<false, K, _, _>(ray, &mut any, &mut Off).is_break()
+    }
+
+    #[inline(always)]
+    fn across<T: Tier>(self, ray: &Ray<f64>) -> bool {
+        self.0.any_across::<T>(ray, None)
     }
 
     #[inline(always)]
@@ -248,7 +267,7 @@ fn trace<L: Lanes, K: Kernel, C: Collector>(
     if !is_interval(ray) {
         return ControlFlow::Continue(());
     }
-    let Only { model, tree, transform } = *only;
+    let Only { model, tree, transform, .. } = *only;
     model.trace_wide::<L, false, _, K, C, Off>(tree, ray, (0, transform), collector, &mut Off)
 }
 
@@ -266,25 +285,25 @@ impl<A: Asked> ForKernel for One<'_, A> {
         let Self { asked, ray } = self;
         match asked.scene().inner().only() {
             Some((level, only)) => simd::run(level, Whole::<_, K> { only, asked, ray, kernel: PhantomData }),
-            None => self.anywhere::<K>(),
+            None => asked.anywhere::<K>(ray),
         }
     }
 }
 
 impl<A: Asked> Shortest for One<'_, A> {
     #[inline(always)]
-    fn anywhere<K: Kernel>(self) -> A::Answer {
-        self.asked.anywhere::<K>(self.ray)
+    fn across<T: Tier>(self) -> A::Answer {
+        self.asked.across::<T>(self.ray)
     }
 
     #[inline(always)]
     fn in_wide<T: Tier>(self, level: Available, only: Only<'_, Wide8>) -> A::Answer {
-        simd::run(level, Short::<_, _, T> { only, asked: self.asked, ray: self.ray, tier: PhantomData })
+        simd::run(level, Short::<_, _, T>::new(only, self.asked, self.ray))
     }
 
     #[inline(always)]
     fn in_compact<T: Tier>(self, level: Available, only: Only<'_, Compact8>) -> A::Answer {
-        simd::run(level, Short::<_, _, T> { only, asked: self.asked, ray: self.ray, tier: PhantomData })
+        simd::run(level, Short::<_, _, T>::new(only, self.asked, self.ray))
     }
 }
 
@@ -305,17 +324,21 @@ impl<A: Asked> ForKernel for Batch<'_, A> {
             Some((level, only)) => {
                 simd::run(level, WholeBatch::<_, K> { only, asked, rays, answers, kernel: PhantomData })
             }
-            None => Self { asked, rays, answers }.anywhere::<K>(),
+            None => {
+                for (ray, to) in rays.iter().zip(answers) {
+                    *to = asked.anywhere::<K>(ray);
+                }
+            }
         }
     }
 }
 
 impl<A: Asked> Shortest for Batch<'_, A> {
     #[inline(always)]
-    fn anywhere<K: Kernel>(self) {
+    fn across<T: Tier>(self) {
         let Self { asked, rays, answers } = self;
         for (ray, to) in rays.iter().zip(answers) {
-            *to = asked.anywhere::<K>(ray);
+            *to = asked.across::<T>(ray);
         }
     }
 
@@ -350,11 +373,18 @@ impl<A: Asked, K: Kernel> Work for Whole<'_, A, K> {
 }
 
 /// The same by the shortest way.
-struct Short<'a, A, W, T> {
+pub(super) struct Short<'a, A, W, T> {
     only: Only<'a, W>,
     asked: A,
     ray: &'a Ray<f64>,
     tier: PhantomData<T>,
+}
+
+impl<'a, A, W, T> Short<'a, A, W, T> {
+    #[inline(always)]
+    pub(super) fn new(only: Only<'a, W>, asked: A, ray: &'a Ray<f64>) -> Self {
+        Self { only, asked, ray, tier: PhantomData }
+    }
 }
 
 impl<A: Asked, W: WideTree, T: Tier> Work for Short<'_, A, W, T> {
@@ -367,11 +397,11 @@ impl<A: Asked, W: WideTree, T: Tier> Work for Short<'_, A, W, T> {
 }
 
 /// The same of a ray that leaves a triangle.
-struct Leaving<'a, A> {
-    only: Only<'a, Wide8>,
-    asked: A,
-    ray: &'a Ray<f64>,
-    place: usize,
+pub(super) struct Leaving<'a, A> {
+    pub(super) only: Only<'a, Wide8>,
+    pub(super) asked: A,
+    pub(super) ray: &'a Ray<f64>,
+    pub(super) place: usize,
 }
 
 impl<A: Asked> Work for Leaving<'_, A> {
@@ -500,7 +530,7 @@ impl Inner {
         if let Some((level, only)) = self.only_compact() {
             return work.in_compact::<T>(level, only);
         }
-        work.anywhere::<T>()
+        work.across::<T>()
     }
 
     /// The only instance of a scene.
@@ -515,13 +545,26 @@ impl Inner {
         let instance = self.single()?;
         let model = &self.models[instance.model as usize];
         let (tree, level) = model.wide()?;
-        Some((level, Only { model, tree, transform: &instance.transform }))
+        Some((level, Only { model, tree, transform: &instance.transform, instance: 0 }))
+    }
+
+    /// Whether rays that leave a triangle need not meet it.
+    #[inline(always)]
+    fn leaves(&self) -> bool {
+        self.options.precision == Precision::Robust && self.options.guards.contains(NEEDED | Guards::OFFSET)
+    }
+
+    /// An instance and the place there of a triangle that rays leave.
+    fn left_of_several(&self, source: HitId) -> Left {
+        let instance = self.instances.get(source.instance as usize).filter(|_| self.leaves())?;
+        let id = PrimitiveId { geometry: source.geometry, primitive: source.primitive };
+        Some((source.instance, self.models[instance.model as usize].place(id)?))
     }
 
     /// The only instance of a scene and the place there of a triangle that rays leave.
     #[inline(always)]
     fn left(&self, source: HitId) -> Option<(Available, Only<'_, Wide8>, usize)> {
-        if self.options.precision != Precision::Robust || !self.options.guards.contains(NEEDED | Guards::OFFSET) {
+        if !self.leaves() {
             return None;
         }
         let (level, only) = self.only()?;
@@ -536,6 +579,6 @@ impl Inner {
         let instance = self.single()?;
         let model = &self.models[instance.model as usize];
         let (tree, level) = model.compact()?;
-        Some((level, Only { model, tree, transform: &instance.transform }))
+        Some((level, Only { model, tree, transform: &instance.transform, instance: 0 }))
     }
 }

@@ -1,5 +1,6 @@
 //! Queries, one file each, over one way of collecting hits.
 
+mod across;
 mod all_hits;
 mod any_hit;
 mod batch;

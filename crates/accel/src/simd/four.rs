@@ -1,13 +1,16 @@
 //! Four `f64`: a vector of one ray in one register, with a lane to spare. [`Portable`] is their meaning.
 
 use super::Portable;
+use super::eight::EXPONENT;
+
+/// From this an exponent is subtracted for the reciprocal's.
+pub(super) const TWICE_THE_BIAS: u64 = 2046 << 52;
 
 /// Four `f64`, each operation rounded by itself. Comparisons answer with one bit for each lane, false for NaN.
 pub(crate) trait Four: Copy {
     fn splat(x: f64) -> Self;
     fn new(x: f64, y: f64, z: f64, w: f64) -> Self;
     fn store(self) -> [f64; 4];
-    fn add(self, o: Self) -> Self;
     fn sub(self, o: Self) -> Self;
     fn mul(self, o: Self) -> Self;
     fn abs(self) -> Self;
@@ -15,6 +18,9 @@ pub(crate) trait Four: Copy {
     fn le(self, o: Self) -> u32;
     /// The largest of the first three lanes, where none is NaN.
     fn largest(self) -> f64;
+    /// The power of two at or below the largest of the first three lanes, which is a normal number, and its reciprocal: each in all
+    /// lanes.
+    fn powers(self) -> (Self, Self);
 }
 
 /// What single rays need of eight `f32` beyond `Lanes`.
@@ -56,10 +62,6 @@ impl Four for PortableFour {
         self.0
     }
     #[inline(always)]
-    fn add(self, o: Self) -> Self {
-        self.zip(o, |a, b| a + b)
-    }
-    #[inline(always)]
     fn sub(self, o: Self) -> Self {
         self.zip(o, |a, b| a - b)
     }
@@ -84,6 +86,11 @@ impl Four for PortableFour {
         let [x, y, z, _] = self.0;
         let xy = if x > y { x } else { y };
         if xy > z { xy } else { z }
+    }
+    #[inline(always)]
+    fn powers(self) -> (Self, Self) {
+        let exponent = self.largest().to_bits() & EXPONENT;
+        (Self::splat(f64::from_bits(exponent)), Self::splat(f64::from_bits(TWICE_THE_BIAS.wrapping_sub(exponent))))
     }
 }
 
@@ -124,7 +131,8 @@ mod tests {
             // No lane may be NaN, and zeros of either sign are as large as each other.
             let most = [self.0[0], self.0[1], self.0[2]].map(|x| if x.is_nan() { 1.0 } else { x });
             let most = L::Four::new(most[0], most[1], most[2], f64::NAN).abs().largest();
-            let rows = [a.add(b), a.sub(b), a.mul(b), a.abs(), L::Four::splat(most)];
+            let normal = L::Four::splat(most.clamp(1e-300, 1e300)).powers();
+            let rows = [a.sub(b), a.mul(b), a.abs(), L::Four::splat(most), normal.0, normal.1];
             let narrow = L::narrow_four(a);
             let mut singles = Vec::new();
             for x in [narrow, narrow.reordered(self.2)] {

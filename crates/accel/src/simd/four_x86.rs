@@ -6,7 +6,8 @@ use core::arch::x86_64::*;
 
 use super::avx2::Avx2;
 use super::avx512::Avx512;
-use super::four::{Four, OfFour};
+use super::eight::EXPONENT;
+use super::four::{Four, OfFour, TWICE_THE_BIAS};
 
 /// All four.
 #[derive(Clone, Copy)]
@@ -31,10 +32,6 @@ impl Four for Quad {
         out
     }
     #[inline(always)]
-    fn add(self, o: Self) -> Self {
-        unsafe { Self(_mm256_add_pd(self.0, o.0)) }
-    }
-    #[inline(always)]
     fn sub(self, o: Self) -> Self {
         unsafe { Self(_mm256_sub_pd(self.0, o.0)) }
     }
@@ -56,6 +53,15 @@ impl Four for Quad {
             let (low, high) = (_mm256_castpd256_pd128(self.0), _mm256_extractf128_pd::<1>(self.0));
             let most = _mm_max_sd(low, high);
             _mm_cvtsd_f64(_mm_max_sd(_mm_unpackhi_pd(low, low), most))
+        }
+    }
+    #[inline(always)]
+    fn powers(self) -> (Self, Self) {
+        unsafe {
+            let largest = _mm256_castpd_si256(_mm256_set1_pd(self.largest()));
+            let exponent = _mm256_and_si256(largest, _mm256_set1_epi64x(EXPONENT as i64));
+            let reciprocal = _mm256_sub_epi64(_mm256_set1_epi64x(TWICE_THE_BIAS as i64), exponent);
+            (Self(_mm256_castsi256_pd(exponent)), Self(_mm256_castsi256_pd(reciprocal)))
         }
     }
 }

@@ -189,7 +189,16 @@ pub(crate) fn prefetch<T>(what: &T) {
 /// Does the work by the instructions of a level.
 #[inline(always)]
 pub(crate) fn run<W: Work>(level: Available, work: W) -> W::Output {
-    by_vectors(level, work).unwrap_or_else(portable)
+    // Not by `by_vectors`: what lies between would copy the answer.
+    match level.0 {
+        // SAFETY: an `Available` is made only of levels that the processor has.
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx2 => unsafe { avx2::run(work) },
+        // SAFETY: as above.
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx512 => unsafe { avx512::run(work) },
+        _ => portable(work),
+    }
 }
 
 /// The same, if these are not plain Rust, which is large when compiled: then the work comes back.

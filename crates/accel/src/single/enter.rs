@@ -1,32 +1,50 @@
 //! One ray's way into a mesh: what [`LocalRay`] is, with all axes side by side, and made no larger than a query of one tier
 //! needs.
+//!
+//! The first test of boxes waits for this, so what it needs is worked out by the shortest chains of operations: reciprocals of the
+//! direction before it is scaled, boxes that are met as if larger by no less than is needed, but by the same for all rays that
+//! start nearby. What comes later (the scaled direction, the line in double precision) is worked out beside.
 
 use firsthit_geometry::{Ray, Real, transform::Transform};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
-use crate::local::{Extent, FAR, Line, U, delta, far, scales};
+use crate::local::{Extent, Line, LocalRay, U};
 use crate::scene::is_interval;
 use crate::simd::{Four, Lanes};
+use crate::wide::{FARTHEST, SMALLEST, in_lanes};
 
-/// A ray in an object's normalised space. What is the same as in a [`LocalRay`](crate::local::LocalRay) has the same bits:
-/// it comes from the operations of [`LocalRay::enter`](crate::local::LocalRay::enter) in their order.
+/// A ray in an object's normalised space. What is the same as in a [`LocalRay`] has the same bits: it comes from the operations of
+/// [`LocalRay::enter`] in their order.
 #[derive(Clone, Copy)]
 pub(crate) struct Entered<L: Lanes> {
     pub(super) line: Line,
     pub(super) t_scale: f64,
     pub(super) t_unscale: f64,
-    /// By how much boxes are to be met as if larger.
+    /// Not below [`LocalRay::delta`].
     pub(super) delta: f32,
     /// Origin and direction in single precision, in the first three lanes.
     pub(super) origin: L,
     pub(super) direction: L,
+    /// Reciprocals of the direction, finite.
+    pub(super) inverse: L,
     /// The boxes' interval.
     pub(super) interval: [f32; 2],
+    /// How far moving the origin may put the end of the boxes' interval off.
+    slack: f32,
 }
 
+/// Directions whose largest component lies between this and its reciprocal have room for reciprocals before they are
+/// scaled.
+const LEAST: f64 = 1.0 / (1u32 << 20) as f64;
+
+/// How far the ends of the boxes' interval may be off, relative: 16 roundings of boxes, and some of the ends' own. See
+/// [`box_t`](crate::local::box_t).
+pub(crate) const OFF: f32 = 24.0 * U as f32;
+
+/// The last lane is of no use.
 #[inline(always)]
-fn four<F: Four>(v: DVec3) -> F {
-    F::new(v.x, v.y, v.z, 0.0)
+pub(crate) fn four<F: Four>(v: DVec3) -> F {
+    F::new(v.x, v.y, v.z, v.z)
 }
 
 #[inline(always)]
@@ -35,58 +53,95 @@ fn three<F: Four>(v: F) -> DVec3 {
     DVec3::new(x, y, z)
 }
 
+/// Finite reciprocals of a direction whose smallest components are taken to be `smallest`.
+#[inline(always)]
+pub(crate) fn reciprocals<L: Lanes>(direction: L, smallest: f32) -> L {
+    L::splat(1.0).div(direction.abs().max(L::splat(smallest)).turned_by(direction))
+}
+
 impl<L: Lanes> Entered<L> {
-    /// `None` as of [`LocalRay::enter`](crate::local::LocalRay::enter), and for an interval that is none.
+    /// `None` as of [`LocalRay::enter`], and for an interval that is none.
     #[inline(always)]
     pub(super) fn new(ray: &Ray<f64>, transform: &Transform, object: &Extent) -> Option<Self> {
-        let (center, magnitude, half) = object.parts();
-        let (origin, direction) = if transform.is_uniform() {
+        if !is_interval(ray) {
+            return None;
+        }
+        let (origin, direction): (L::Four, L::Four) = if transform.is_uniform() {
             let scale = L::Four::splat(transform.inverse_linear().x_axis.x);
-            let origin: L::Four = four(ray.origin);
-            let direction: L::Four = four(ray.direction);
-            (origin.sub(four(transform.translation())).mul(scale), direction.mul(scale))
+            let from: L::Four = four(ray.origin);
+            let along: L::Four = four(ray.direction);
+            (from.sub(four(transform.translation())).mul(scale), along.mul(scale))
         } else {
             (four(transform.point_to_object(ray.origin)), four(transform.vector_to_object(ray.direction)))
         };
-        let most = L::Four::splat(f64::MAX);
-        let finite = origin.abs().le(most) & direction.abs().le(most);
-        if !(finite & 7 == 7 && is_interval(ray)) {
-            return None;
+        let (center, _, half) = object.parts();
+        let [(far, delta), (near, least_delta)] = object.bounds_of_rays();
+        let center: L::Four = L::Four::new(center[0], center[1], center[2], center[2]);
+        let (apart, size) = (origin.sub(center).abs(), direction.abs());
+        let here = apart.le(L::Four::splat(far)) & size.le(L::Four::splat(1.0 / LEAST));
+        if !(here & 7 == 7 && L::Four::splat(LEAST).le(size) & 7 != 0) {
+            return Self::rare(ray, transform, object);
         }
-        let (t_scale, t_unscale) = scales(direction.abs().largest())?;
-        let direction = direction.mul(L::Four::splat(t_unscale));
-        let line = three(direction);
-        let (mut moved, mut shift, mut off) = (origin, 0.0, 0.0);
-        let center: L::Four = L::Four::new(center[0], center[1], center[2], 0.0);
-        let relative = origin.sub(center);
-        let mut farthest = relative.abs().largest() + half;
-        if farthest > (FAR + 1.0) * half {
-            (shift, off) = far(three(relative), line, half);
-            moved = origin.add(direction.mul(L::Four::splat(shift)));
-            farthest = moved.sub(center).abs().largest() + half;
-        }
-        // `LocalRay::box_t` of both ends.
-        let local = L::Four::new(ray.t_min, ray.t_max, 0.0, 0.0).mul(L::Four::splat(t_scale));
-        let from_moved = local.sub(L::Four::splat(shift));
-        let rounded = local.abs().add(L::Four::splat(shift.abs())).mul(L::Four::splat(16.0 * f64::UNIT_ROUNDOFF));
-        let error = from_moved.abs().mul(L::Four::splat(16.0 * U)).add(rounded);
-        let [start, end, ..] = L::narrow_four(from_moved.add(L::Four::new(-1.0, 1.0, 0.0, 0.0).mul(error))).store();
+        let delta = if apart.le(L::Four::splat(near)) & 7 == 7 { least_delta } else { delta };
+        let (scale, unscale) = size.powers();
+        let scale32 = L::narrow_four(scale);
+        // As small, once it is scaled, as what `Boxes` takes for a component, or smaller.
+        let inverse = reciprocals(L::narrow_four(direction), SMALLEST * LEAST as f32).mul(scale32);
+        let direction = direction.mul(unscale);
+        let ends = L::narrow_four(L::Four::new(ray.t_min, ray.t_max, ray.t_min, ray.t_max)).mul(scale32);
+        let out = ends.abs().mul(L::load(&[-OFF, OFF, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]));
+        let [start, end, ..] = ends.add(out).store();
+        let (line, farthest) = (three(direction), apart.largest() + half);
+        let [t_scale, ..] = scale.store();
+        let [t_unscale, ..] = unscale.store();
         Some(Self {
             line: Line {
                 origin: three(origin),
                 direction: line,
                 length_squared: line.length_squared(),
-                span: farthest + 2.0 * shift.abs(),
-                shift,
+                span: farthest,
+                shift: 0.0,
                 farthest,
-                off,
+                off: 0.0,
             },
             t_scale,
             t_unscale,
-            delta: delta(farthest, magnitude, off).to_f32(),
-            origin: L::narrow_four(moved),
+            delta,
+            origin: L::narrow_four(origin),
             direction: L::narrow_four(direction),
+            inverse,
             interval: [start, end],
+            slack: 0.0,
         })
     }
+
+    /// A ray that starts far away, or has a direction that is very short or long, or is none.
+    #[inline(always)]
+    fn rare(ray: &Ray<f64>, transform: &Transform, object: &Extent) -> Option<Self> {
+        let ray = careful(*ray, transform, object)?;
+        let direction: L = in_lanes(ray.direction32);
+        Some(Self {
+            line: ray.line(),
+            t_scale: ray.t_scale,
+            t_unscale: ray.t_unscale,
+            delta: ray.delta.min(FARTHEST),
+            origin: in_lanes(ray.origin32.clamp(Vec3::splat(-FARTHEST), Vec3::splat(FARTHEST))),
+            direction,
+            inverse: reciprocals(direction, SMALLEST),
+            interval: [ray.box_t_min(ray.world[0]), ray.box_t_max(ray.world[1])],
+            slack: (ray.shift.abs() * (64.0 * f64::UNIT_ROUNDOFF)).to_f32(),
+        })
+    }
+
+    /// The end of the boxes' interval for a hit at this distance, local and counted from the moved origin.
+    #[inline(always)]
+    pub(super) fn end(&self, t: f32) -> f32 {
+        t + (t.abs() * OFF + self.slack)
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn careful(ray: Ray<f64>, transform: &Transform, object: &Extent) -> Option<LocalRay> {
+    LocalRay::enter(&ray, transform, object)
 }

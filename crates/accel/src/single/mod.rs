@@ -12,9 +12,9 @@ use core::ops::ControlFlow;
 
 use firsthit_geometry::{Ray, transform::Transform};
 
+pub(crate) use enter::{OFF, four, reciprocals};
 pub(crate) use tier::Lean;
 
-use crate::local::box_t;
 use crate::model::Model;
 use crate::simd::Lanes;
 use crate::stats::Off;
@@ -23,12 +23,13 @@ use crate::{Hit, HitId, Scene};
 use enter::Entered;
 use tier::Seen;
 
-/// The only instance of a scene, of a model with a wide tree (or a compact one): there is nothing above it to be
-/// traversed.
+/// One instance, of a model with a wide tree (or a compact one): what is above it, if anything, has been traversed.
 pub(crate) struct Only<'a, T> {
     pub(crate) model: &'a Model,
     pub(crate) tree: &'a T,
     pub(crate) transform: &'a Transform,
+    /// Its number in the scene.
+    pub(crate) instance: u32,
 }
 
 // Not derived: a tree need not be `Copy` for it.
@@ -52,15 +53,18 @@ impl<T: WideTree> Only<'_, T> {
     ) -> Option<Hit> {
         let entered = Entered::<L>::new(ray, self.transform, self.model.extent())?;
         let from = ray.t_min * entered.t_scale;
-        let best = Best { place: NOTHING, known: [0.0; 3], kept: K::Kept::default() };
-        let mut nearest = Nearest { only: *self, scene, ray, entered, from, leaves, t_max: ray.t_max, best, odd: None };
+        let best = Best { place: NOTHING, unclear: false, known: [0.0; 3], kept: K::Kept::default() };
+        let mut nearest = Nearest { only: *self, scene, ray, entered, from, leaves, t_max: ray.t_max, best };
         let _ = self.walk::<L, K, true>(&entered, &mut nearest);
-        let Nearest { t_max, best, odd, .. } = nearest;
-        let hit = match best.place {
-            NOTHING => return None,
-            ODD => odd?,
-            _ => self.at::<K>(best, t_max)?,
-        };
+        let Nearest { t_max, best, .. } = nearest;
+        if best.place == NOTHING {
+            return None;
+        }
+        if best.unclear {
+            let hit = self.unclear::<K>(ray, best.place, best.known)?;
+            return Some(Hit { normal_direction: self.transform.normal_direction(hit.normal_direction), ..hit });
+        }
+        let hit = self.clear::<K>(best, t_max)?;
         Some(Hit { normal_direction: self.transform.normal_direction(hit.normal_direction), ..hit })
     }
 
@@ -79,17 +83,18 @@ impl<T: WideTree> Only<'_, T> {
         entered: &Entered<L>,
         visitor: &mut impl Visit<Off>,
     ) -> ControlFlow<()> {
-        let boxes = Boxes::<L>::new(entered.origin, entered.direction, if K::PADDED { entered.delta } else { 0.0 });
+        let delta = L::splat(if K::PADDED { entered.delta } else { 0.0 });
+        let boxes = Boxes::<L>::inverted(entered.origin, entered.direction, entered.inverse, delta);
         let picks = K::picks::<L>(entered);
         wide::traverse::<L, T, _, Off, ORDERED>(self.tree, &boxes, entered.interval, &picks, &mut Off, visitor)
     }
 
     /// A hit with its normal in the object's space.
     #[inline(always)]
-    fn at<K: Lean>(&self, best: Best<K>, t: f64) -> Option<Hit> {
+    fn clear<K: Lean>(&self, best: Best<K>, t: f64) -> Option<Hit> {
         let id = self.model.id(best.place)?;
         let (u, v, normal_direction) = K::finish(&self.tree.triangle(best.place), best.known, best.kept);
-        let id = HitId { instance: 0, geometry: id.geometry, primitive: id.primitive };
+        let id = HitId { instance: self.instance, geometry: id.geometry, primitive: id.primitive };
         Some(Hit { id, t, u, v, normal_direction })
     }
 
@@ -99,16 +104,19 @@ impl<T: WideTree> Only<'_, T> {
     #[cold]
     #[inline(never)]
     fn unclear<K: Lean>(self, ray: &Ray<f64>, place: usize, known: [f32; 3]) -> Option<Hit> {
-        self.model.hit_of_one::<K>(ray, self.transform, place, &self.tree.triangle(place), known)
+        let of = (self.instance, self.transform);
+        self.model.hit_of_one::<K>(ray, of, place, &self.tree.triangle(place), known)
     }
 
-    /// Whether, of two hits at the same distance, the first comes first; each is a triangle, or else what the kernel told.
+    /// Whether, of two hits at the same distance, the first comes first.
     #[cold]
     #[inline(never)]
-    fn comes_first<K: Lean>(self, scene: &Scene, ray: &Ray<f64>, t: f64, new: Told<K>, old: Told<K>) -> bool {
-        let new = if new.0.place == ODD { new.1 } else { self.at::<K>(new.0, t) };
-        let old = if old.0.place == ODD { old.1 } else { self.at::<K>(old.0, t) };
-        match (new, old) {
+    fn comes_first<K: Lean>(self, scene: &Scene, ray: &Ray<f64>, t: f64, new: Best<K>, old: Best<K>) -> bool {
+        let at = |best: Best<K>| match best.unclear {
+            true => self.unclear::<K>(ray, best.place, best.known),
+            false => self.clear::<K>(best, t),
+        };
+        match (at(new), at(old)) {
             (Some(new), Some(old)) => scene.comes_first(ray, new, old),
             (new, _) => new.is_some(),
         }
@@ -118,12 +126,11 @@ impl<T: WideTree> Only<'_, T> {
 /// No place: nothing was found.
 const NOTHING: usize = usize::MAX;
 
-/// No place either: the kernel had to tell.
-const ODD: usize = usize::MAX - 1;
-
 /// A triangle and what the filter knows of it.
 struct Best<K: Lean> {
     place: usize,
+    /// The kernel had to tell, and is asked again in the end: it is rare, and what it told need not be kept.
+    unclear: bool,
     known: [f32; 3],
     kept: K::Kept,
 }
@@ -138,9 +145,6 @@ impl<K: Lean> Clone for Best<K> {
 
 impl<K: Lean> Copy for Best<K> {}
 
-/// The same, with what the kernel told where it is [`ODD`].
-type Told<K> = (Best<K>, Option<Hit>);
-
 /// Keeps the nearest, of several at the same distance the first in order.
 struct Nearest<'a, L: Lanes, T, K: Lean> {
     only: Only<'a, T>,
@@ -154,23 +158,16 @@ struct Nearest<'a, L: Lanes, T, K: Lean> {
     /// The world's parameter of the nearest, or the end of the interval.
     t_max: f64,
     best: Best<K>,
-    /// The nearest where it is [`ODD`].
-    odd: Option<Hit>,
 }
 
 impl<L: Lanes, T: WideTree, K: Lean> Nearest<'_, L, T, K> {
-    /// The new end of the boxes' interval if it is the nearest so far.
+    /// The new end of the boxes' interval if it is the nearest so far; `local` is its distance from the moved origin.
     #[inline(always)]
-    fn take(&mut self, t: f64, best: Best<K>, odd: Option<Hit>) -> Option<f32> {
-        let better = |n: &Self| {
-            n.best.place == NOTHING || n.only.comes_first::<K>(n.scene, n.ray, t, (best, odd), (n.best, n.odd))
-        };
+    fn take(&mut self, t: f64, local: f32, best: Best<K>) -> Option<f32> {
+        let better = |n: &Self| n.best.place == NOTHING || n.only.comes_first::<K>(n.scene, n.ray, t, best, n.best);
         if t < self.t_max || (t == self.t_max && better(self)) {
             (self.t_max, self.best) = (t, best);
-            if best.place == ODD {
-                self.odd = odd;
-            }
-            return Some(box_t(t * self.entered.t_scale, self.entered.line.shift, 1.0));
+            return Some(self.entered.end(local));
         }
         None
     }
@@ -184,15 +181,18 @@ impl<L: Lanes, T: WideTree, K: Lean> Visit<Off> for Nearest<'_, L, T, K> {
         }
         let triangle = self.only.tree.triangle(place);
         ControlFlow::Continue(match K::seen(&self.entered, &triangle, known, self.from) {
-            Seen::At(t, kept) => {
+            Seen::At(t, local, kept) => {
                 // -0 becomes 0, as of a `Candidate`.
                 let t = t * self.entered.t_unscale + 0.0;
                 let inside = self.ray.t_min <= t && t.abs() <= f64::MAX;
-                if inside { self.take(t, Best { place, known, kept }, None) } else { None }
+                if inside { self.take(t, local, Best { place, unclear: false, known, kept }) } else { None }
             }
             Seen::Nowhere => None,
             Seen::Unclear => match self.only.unclear::<K>(self.ray, place, known) {
-                Some(hit) => self.take(hit.t, Best { place: ODD, known, kept: K::Kept::default() }, Some(hit)),
+                Some(hit) => {
+                    let local = (hit.t * self.entered.t_scale - self.entered.line.shift) as f32;
+                    self.take(hit.t, local, Best { place, unclear: true, known, kept: K::Kept::default() })
+                }
                 None => None,
             },
         })
@@ -218,7 +218,7 @@ impl<L: Lanes, T: WideTree, K: Lean> Visit<Off> for First<'_, L, T, K> {
             return ControlFlow::Continue(None);
         }
         let hit = match K::seen(&self.entered, &self.only.tree.triangle(place), known, self.from) {
-            Seen::At(t, _) => {
+            Seen::At(t, ..) => {
                 let t = t * self.entered.t_unscale;
                 self.ray.t_min <= t && t <= self.ray.t_max && t.abs() <= f64::MAX
             }

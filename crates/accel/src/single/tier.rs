@@ -13,8 +13,8 @@ use crate::wide::{Filter, Plain, Sheared};
 
 /// Where a ray meets a triangle that has passed the filter.
 pub(crate) enum Seen<K> {
-    /// At this `t`, local and counted from the true origin; with what is known then.
-    At(f64, K),
+    /// At this `t`, local and counted from the true origin, and from the moved one; with what is known then.
+    At(f64, f32, K),
     Nowhere,
     /// The kernel has to tell.
     Unclear,
@@ -36,12 +36,13 @@ pub(crate) trait Lean: Kernel {
 }
 
 /// As [`plane`](crate::kernel::plane) where the short way does not do. By value: what is passed by reference has to be kept in
-/// memory by the caller, always.
+/// memory by the caller, always. Not so rare, but cold: registers are for what lies around it.
+#[cold]
 #[inline(never)]
 fn careful<const GRAZED: bool>(triangle: [Vec3; 3], line: Line) -> Seen<DVec3> {
     let Some(plane) = careful_plane(triangle, line, GRAZED) else { return Seen::Nowhere };
     let t = if GRAZED { within_triangle(line, plane.t, triangle) } else { Some(plane.t) };
-    t.map_or(Seen::Nowhere, |t| Seen::At(t, plane.normal))
+    t.map_or(Seen::Nowhere, |t| Seen::At(t, (t - line.shift) as f32, plane.normal))
 }
 
 impl Lean for Fast {
@@ -56,7 +57,7 @@ impl Lean for Fast {
 
     #[inline(always)]
     fn seen<L: Lanes>(ray: &Entered<L>, _: &[Vec3; 3], [t, ..]: [f32; 3], _: f64) -> Seen<()> {
-        Seen::At(f64::from(t) + ray.line.shift, ())
+        Seen::At(f64::from(t) + ray.line.shift, t, ())
     }
 
     #[inline(always)]
@@ -81,12 +82,12 @@ impl Lean for Robust {
     fn seen<L: Lanes>(ray: &Entered<L>, triangle: &[Vec3; 3], known: [f32; 3], from: f64) -> Seen<DVec3> {
         // As `Weights::told`, without its division: what is near the ends of what numbers there are is not for here.
         let [e0, e1, e2] = known;
-        let (sum, least) = ((e0 + e1 + e2).abs(), e0.abs().min(e1.abs()).min(e2.abs()));
-        if !((1e-36..=1e36).contains(&sum) & (least > 0.0)) {
+        let sum = (e0 + e1 + e2).abs();
+        if !((1e-36..=1e36).contains(&sum) & (e0 != 0.0) & (e1 != 0.0) & (e2 != 0.0)) {
             return Seen::Unclear;
         }
         match short_plane(triangle, &ray.line, MOST, from) {
-            Short::Met(plane) => Seen::At(plane.t, plane.normal),
+            Short::Met(plane) => Seen::At(plane.t, (plane.t - ray.line.shift) as f32, plane.normal),
             Short::Before => Seen::Nowhere,
             Short::Grazed => careful::<true>(*triangle, ray.line),
             Short::Lost => careful::<false>(*triangle, ray.line),

@@ -75,9 +75,15 @@ impl<L: Lanes> Boxes<L> {
     /// For a ray (in the first three lanes), and boxes that are to be met as if larger by `delta` in each axis.
     #[inline(always)]
     pub(crate) fn new(origin: L, direction: L, delta: f32) -> Self {
-        // All axes at once; the other lanes are of no use.
         let inverse = L::splat(1.0).div(direction.abs().max(L::splat(SMALLEST)).turned_by(direction));
-        let (origin, out) = (kept_near(origin), kept_near(L::splat(delta)).turned_by(direction));
+        Self::inverted(kept_near(origin), direction, inverse, kept_near(L::splat(delta)))
+    }
+
+    /// The same for numbers that are within [`FARTHEST`], with the reciprocals of the direction, which are finite.
+    #[inline(always)]
+    pub(crate) fn inverted(origin: L, direction: L, inverse: L, delta: L) -> Self {
+        // All axes at once; the other lanes are of no use.
+        let out = delta.turned_by(direction);
         let (near, far) = (origin.add(out).mul(inverse), origin.sub(out).mul(inverse));
         let [x, y, z] = ROWS[direction.negative() as usize & 7];
         Self {

@@ -6,7 +6,7 @@ mod triangles;
 
 use core::ops::ControlFlow;
 
-pub(crate) use boxes::{Axis, Boxes, SMALLEST, in_lanes, kept_near};
+pub(crate) use boxes::{Axis, Boxes, FARTHEST, SMALLEST, in_lanes, kept_near};
 pub(crate) use tree::{BoxNode, Leaf, WideTree};
 pub(crate) use triangles::{Either, Filter, Margin, Plain, Sheared};
 
