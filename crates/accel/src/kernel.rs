@@ -160,6 +160,11 @@ pub(crate) trait Kernel {
     fn crosses(setup: &Self::Setup, ray: &LocalRay, vertices: &[Vec3; 3], t_max: f64) -> Option<Found> {
         Self::test(setup, ray, vertices, t_max)
     }
+    /// Whether [`Kernel::test`] finds a hit in the ray's interval, of tiers that tell sooner than where.
+    #[inline(always)]
+    fn is_hit(_: &Self::Setup, _vertices: &[Vec3; 3], _t_max: f64) -> Option<bool> {
+        None
+    }
     /// [`Kernel::test`] of a triangle that passed the filter, with what that knows of it.
     #[inline(always)]
     fn test_known(
@@ -415,6 +420,11 @@ impl Kernel for Exact {
     fn test(setup: &Option<ExactRay>, _: &LocalRay, vertices: &[Vec3; 3], t_max: f64) -> Option<Found> {
         let hit = setup.as_ref()?.hit_before(double(vertices), t_max)?;
         Some(Self::found(&hit, vertices))
+    }
+
+    #[inline(always)]
+    fn is_hit(setup: &Option<ExactRay>, vertices: &[Vec3; 3], t_max: f64) -> Option<bool> {
+        Some(setup.as_ref().is_some_and(|ray| ray.is_hit_before(double(vertices), t_max)))
     }
 
     #[inline(always)]

@@ -39,6 +39,15 @@ impl<'a, const SURFACES: bool, K: Kernel> OfferTriangle<'a, SURFACES, K> {
         collector: &mut C,
         probe: &mut P,
     ) -> ControlFlow<(), Option<f32>> {
+        if !SURFACES
+            && collector.asks_only_whether()
+            && let Some(is_hit) = K::is_hit(&self.setup, triangle, self.limit)
+        {
+            return match is_hit && self.model.id(place).is_some() {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(None),
+            };
+        }
         let found = match known {
             _ if SURFACES => K::crosses(&self.setup, self.ray, triangle, self.limit),
             Some(known) => K::test_known(&self.setup, self.ray, triangle, known, self.limit),

@@ -7,7 +7,7 @@ use core::ops::ControlFlow;
 use firsthit_geometry::{Ray, Real};
 
 use super::direct::{AskAny, AskClosest, Asked, Leaving, Short};
-use super::{Any, Closest, Collect};
+use super::{Closest, Collect, Whether};
 use crate::above::Wide;
 use crate::instance::Instance;
 use crate::layout::wide8::Reference;
@@ -119,7 +119,7 @@ impl<T: Tier> VisitInstance for First<'_, T> {
                 _ => simd::run(level, Short::<_, _, T>::new(only, asked, ray)),
             }
         } else {
-            let mut any = Collect::new(ray, None, |_| true, Any);
+            let mut any = Whether::new(ray);
             let precision = scene.options().precision;
             model.trace::<false, T, _, _>(ray, (i, transform), precision, &mut any, &mut Off).is_break()
         };

@@ -7,7 +7,7 @@ use core::ops::ControlFlow;
 use firsthit_geometry::{Precision, Ray};
 
 use super::across::Left;
-use super::{Any, Closest, Collect, Collector};
+use super::{Closest, Collect, Collector, Whether};
 use crate::instance::Instance;
 use crate::kernel::{Double, Exact, Fast, Guarded, Kernel, Robust};
 use crate::layout::compact8::Compact8;
@@ -215,7 +215,7 @@ impl Asked for AskAny<'_> {
 
     #[inline(always)]
     fn anywhere<K: Kernel>(self, ray: &Ray<f64>) -> bool {
-        let mut any = Collect::new(ray, None, |_| true, Any);
+        let mut any = Whether::new(ray);
         self.0.inner().trace_by::<false, K, _, _>(ray, &mut any, &mut Off).is_break()
     }
 
@@ -226,7 +226,7 @@ impl Asked for AskAny<'_> {
 
     #[inline(always)]
     fn whole<L: Lanes, K: Kernel>(self, only: &Only<'_, Wide8>, ray: &Ray<f64>) -> bool {
-        let mut any = Collect::new(ray, None, |_| true, Any);
+        let mut any = Whether::new(ray);
         trace::<L, K, _>(only, ray, &mut any).is_break()
     }
 

@@ -21,7 +21,7 @@ use glam::DVec3;
 
 pub(crate) use all_hits::All;
 pub use all_hits::HitLists;
-pub(crate) use any_hit::Any;
+pub(crate) use any_hit::{Any, Whether};
 pub(crate) use closest_hit::Closest;
 pub use closest_point::ClosestPoint;
 pub use crossings::Crossings;
@@ -53,6 +53,11 @@ pub(crate) trait Collector {
     fn offer(&mut self, hit: Candidate) -> ControlFlow<(), bool>;
     /// Whether finding near hits first helps.
     fn ordered(&self) -> bool;
+    /// Whether nothing is asked of a hit but that it lies in the interval: then one may be told of by breaking.
+    #[inline(always)]
+    fn asks_only_whether(&self) -> bool {
+        false
+    }
 }
 
 /// What a query does with the hits that it wants.

@@ -74,6 +74,14 @@ pub struct ExactHit {
     vertices: [DVec3; 3],
 }
 
+/// Outcome of the first stage.
+enum Sides {
+    Outside,
+    /// Strictly inside, with the weights of vertices 1 and 2.
+    Inside(f64, f64),
+    Unclear,
+}
+
 /// Outcome of the edge functions.
 enum Inside {
     Strictly,
@@ -130,10 +138,44 @@ impl ExactRay {
     #[inline]
     #[must_use]
     pub fn hit_before(&self, vertices: [DVec3; 3], t_max: f64) -> Option<ExactHit> {
+        match self.sides(&vertices) {
+            Sides::Outside => None,
+            Sides::Inside(u, v) => self.place(vertices, t_max, (u, v), Inside::Strictly, false),
+            Sides::Unclear => self.careful(vertices, t_max),
+        }
+    }
+
+    /// Whether [`Self::hit_before`] finds a hit. The parameter is not rounded unless it lies near an end of the interval, so this
+    /// costs less.
+    ///
+    /// ```
+    /// use firsthit_geometry::{Ray, exact::ExactRay};
+    /// use glam::DVec3;
+    /// let ray = ExactRay::new(Ray::new(DVec3::new(0.25, 0.25, 3.0), DVec3::NEG_Z)).unwrap();
+    /// let triangle = [DVec3::ZERO, DVec3::X, DVec3::Y];
+    /// assert!(ray.is_hit_before(triangle, 3.0) && !ray.is_hit_before(triangle, 2.9));
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn is_hit_before(&self, vertices: [DVec3; 3], t_max: f64) -> bool {
+        match self.sides(&vertices) {
+            Sides::Outside => false,
+            Sides::Inside(u, v) => {
+                let (first, last) = self.parameter_range(&vertices);
+                let surely = self.ray.t_min < first && last < self.ray.t_max.min(t_max) && last.is_finite();
+                surely || self.place(vertices, t_max, (u, v), Inside::Strictly, false).is_some()
+            }
+            Sides::Unclear => self.careful(vertices, t_max).is_some(),
+        }
+    }
+
+    /// The first stage: edge functions in the sheared plane.
+    #[inline(always)]
+    fn sides(&self, vertices: &[DVec3; 3]) -> Sides {
         let [a, b, c] = [vertices[0] - self.anchor, vertices[1] - self.anchor, vertices[2] - self.anchor];
         let reach = a.abs().max(b.abs()).max(c.abs()).max_element();
         if !(self.tame && reach < LARGE) {
-            return self.careful(vertices, t_max);
+            return Sides::Unclear;
         }
         let ((ax, ay), (bx, by), (cx, cy)) = (self.shear.apply(a), self.shear.apply(b), self.shear.apply(c));
         let e0 = cx * by - cy * bx;
@@ -147,13 +189,13 @@ impl ExactRay {
         let below = e0 < -bound || e1 < -bound || e2 < -bound;
         let above = e0 > bound || e1 > bound || e2 > bound;
         if below && above {
-            return None;
+            return Sides::Outside;
         }
         if e0.abs() > bound && e1.abs() > bound && e2.abs() > bound {
             let inverse = 1.0 / (e0 + e1 + e2);
-            return self.place(vertices, t_max, (e1 * inverse, e2 * inverse), Inside::Strictly, false);
+            return Sides::Inside(e1 * inverse, e2 * inverse);
         }
-        self.careful(vertices, t_max)
+        Sides::Unclear
     }
 
     /// The exact order of two hits of this ray along it.
@@ -412,6 +454,27 @@ mod tests {
                     prop_assert_eq!(hit.t, n as f64 / d as f64);
                     // Its f64 lies on a tie of f32 only if it is exact.
                     prop_assert_eq!(ray.t_f32(&hit), hit.t as f32);
+                }
+            }
+        }
+
+        /// Whether there is a hit is told without rounding its parameter, and alike: near the ends of the interval too.
+        #[test]
+        fn whether_is_where_without_its_number(
+            v in [point(4), point(4), point(4)], o in point(6), d in point(4), e in prop_oneof![Just(0), -120i32..100, -330i32..330],
+            ends in [-2i64..3, -2i64..3], [low, high, most] in [0usize..4, 0..4, 0..4],
+        ) {
+            prop_assume!(d != [0; 3]);
+            let s = 2f64.powi(e);
+            let v = v.map(|p| vec(p, s));
+            let t = line(o, d, s).hit(v).map_or(0.5, |hit| hit.t);
+            let beside = |k: i64| f64::from_bits(t.to_bits().wrapping_add_signed(k));
+            let ends = [f64::NEG_INFINITY, beside(ends[0]), beside(ends[1]), f64::INFINITY];
+            let (low, high, most) = (ends[low], ends[high], ends[most]);
+            let ray = Ray::<f64>::new(vec(o, s), vec(d, s)).with_interval(low, high);
+            if let Some(ray) = ExactRay::new(ray) {
+                for ray in [ray, ray.near(t)] {
+                    prop_assert_eq!(ray.is_hit_before(v, most), ray.hit_before(v, most).is_some());
                 }
             }
         }
