@@ -254,7 +254,7 @@ impl<L: Lanes> Boxed<L> for Nearest<'_> {
 
 /// Boxes are met as if larger by less than this, in a frame of size near 1: reciprocals are below 2^60, and products of the
 /// two must stay far from infinity, or children that are missing would be met.
-const WIDEST: f32 = 1024.0;
+pub(crate) const WIDEST: f32 = 1024.0;
 
 /// Where the scene's boxes are of single precision.
 #[derive(Clone, Debug)]

@@ -8,7 +8,7 @@ use firsthit_geometry::{Ray, Real};
 
 use super::direct::{AskAny, AskClosest, Asked, Leaving, Short};
 use super::{Closest, Collect, Whether};
-use crate::above::Wide;
+use crate::above::{WIDEST, Wide};
 use crate::instance::Instance;
 use crate::layout::wide8::Reference;
 use crate::local::FAR;
@@ -162,16 +162,16 @@ impl<V: VisitInstance> Work for Walk<'_, V> {
         let [(far, delta), (near, least_delta)] = extent.bounds_of_rays();
         let (apart, size) = (origin.abs(), direction.abs());
         let here = apart.le(L::Four::splat(far)) & size.le(L::Four::splat(1.0 / LEAST));
-        if !(here & 7 == 7 && L::Four::splat(LEAST).le(size) & 7 != 0) {
-            return None;
-        }
         let delta = if apart.le(L::Four::splat(near)) & 7 == 7 { least_delta } else { delta };
         // What `Inner::entering` says, for the farthest of these rays.
         let (_, _, half) = extent.parts();
-        let delta = L::splat(delta + ((FAR + 3.0) * half * inner.round_trip()).to_f32().next_up());
+        let delta = delta + ((FAR + 3.0) * half * inner.round_trip()).to_f32().next_up();
+        if !(here & 7 == 7 && L::Four::splat(LEAST).le(size) & 7 != 0 && delta < WIDEST) {
+            return None;
+        }
         let (origin, direction) = (L::narrow_four(origin), L::narrow_four(direction));
         let inverse = reciprocals(direction, SMALLEST * LEAST as f32);
-        let boxes = Boxes::<L>::inverted(origin, direction, inverse, delta);
+        let boxes = Boxes::<L>::inverted(origin, direction, inverse, L::splat(delta));
 
         let start = L::splat(-end(-ray.t_min));
         let mut t_max = end(ray.t_max);
