@@ -97,7 +97,9 @@ impl Only<'_> {
     fn unclear(self, ray: Ray<f64>, place: usize, known: [f32; 3]) -> u32 {
         let triangle = WideTree::triangle(self.tree, place);
         if !self.surfaces {
-            return u32::from(self.model.hit_of_one::<Robust>(&ray, self.transform, place, &triangle, known).is_some());
+            return u32::from(
+                self.model.hit_of_one::<Robust>(&ray, (0, self.transform), place, &triangle, known).is_some(),
+            );
         }
         let Some(local) = LocalRay::enter(&ray, self.transform, self.model.extent()) else { return 0 };
         let mut count = Collect::new(&ray, None, |_| true, Count(0));
