@@ -1,6 +1,6 @@
 //! Every answer against all triangles, decided exactly: how many are wrong.
 //!
-//! `cargo run --release -p firsthit-benches --bin brute -- [--random N] [--aimed M] [--json FILE] MODEL...`
+//! `cargo run --release -p firsthit-benches --bin brute -- [--random N] [--aimed M] [--only rays|points] [--json FILE] MODEL...`
 
 use std::io::{IsTerminal, Write as _, stderr};
 use std::path::PathBuf;
@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-use clap::Parser;
+use clap::{Parser, ValueEnum};
 use firsthit_benches::brute::run::{Plan, Watch, run};
 use firsthit_benches::brute::tally::{Row, table};
 use firsthit_benches::model::Model;
@@ -28,6 +28,9 @@ struct Args {
     /// Rays, and points, at corners, edges and the like
     #[arg(long, value_name = "M", default_value_t = 20_000)]
     aimed: usize,
+    /// Ask rays alone, or points alone
+    #[arg(long, value_name = "WHAT")]
+    only: Option<Only>,
     /// Powers of two by which the model is scaled, comma-separated
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "-40,20", allow_hyphen_values = true)]
     exponents: Vec<i32>,
@@ -43,6 +46,12 @@ struct Args {
     /// A sentence for that file, as about the state of the machine; may be given several times
     #[arg(long, value_name = "TEXT")]
     note: Vec<String>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
+enum Only {
+    Rays,
+    Points,
 }
 
 fn main() -> ExitCode {
@@ -66,6 +75,8 @@ fn all(args: Args) -> Result<u64, String> {
     let plan = Plan {
         random: args.random,
         aimed: args.aimed,
+        rays: args.only != Some(Only::Points),
+        points: args.only != Some(Only::Rays),
         exponents: args.exponents,
         scaled_every: args.scaled_every,
         seed: args.seed,

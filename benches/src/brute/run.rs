@@ -26,6 +26,10 @@ pub struct Plan {
     pub random: usize,
     /// At what is hard.
     pub aimed: usize,
+    /// Whether rays are asked.
+    pub rays: bool,
+    /// Whether points are.
+    pub points: bool,
     /// Powers of two by which the mesh is scaled.
     pub exponents: Vec<i32>,
     /// Of so many chunks of queries one is asked at these scales too.
@@ -80,7 +84,9 @@ pub fn run(model: &Model, plan: &Plan, watch: &Watch<'_>) -> Result<Outcome, Str
     let sieve = Sieve::new(&corners);
 
     let mut job = Job { plan, watch, corners: &corners, sieve: &sieve, tally: &mut tally };
-    job.rays(&whole, &scaled);
+    if plan.rays {
+        job.rays(&whole, &scaled);
+    }
     let methods: Vec<(SignMethod, &str)> = METHODS
         .into_iter()
         .filter(|(method, _)| match method {
@@ -91,7 +97,9 @@ pub fn run(model: &Model, plan: &Plan, watch: &Watch<'_>) -> Result<Outcome, Str
         .collect();
     let size = whole.bounds().extent().length();
     let mut judge = Judge { corners: &corners, closed: edges.closed(), size, worst_distance: 0.0, worst_winding: 0.0 };
-    job.points(&whole, &scaled, &methods, &mut judge);
+    if plan.points {
+        job.points(&whole, &scaled, &methods, &mut judge);
+    }
     let (worst_distance, worst_winding) = (judge.worst_distance, judge.worst_winding);
     let interrupted = watch.stop.load(Relaxed);
     let seconds = start.elapsed().as_secs_f64();
@@ -202,7 +210,8 @@ mod tests {
                 mesh.triangles.truncate(700);
             }
             let model = Model { name: "ball".into(), mesh: mesh.clone() };
-            let plan = Plan { random: 3000, aimed: 3000, exponents: vec![-40, 20], scaled_every: 1, seed: 1 };
+            let (random, aimed, exponents) = (3000, 3000, vec![-40, 20]);
+            let plan = Plan { random, aimed, rays: true, points: true, exponents, scaled_every: 1, seed: 1 };
             let watch = Watch { stop: &AtomicBool::new(false), say: &|_, _, _| {} };
             let outcome = run(&model, &plan, &watch).unwrap();
             assert_eq!(outcome.tally.wrong(), 0, "{:#?}", outcome.tally.failures);

@@ -1,7 +1,8 @@
 //! Scenes and what they are asked.
 
+use std::ops::Deref;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use firsthit_accel::{BuildOptions, BuildQuality, Crossings, SceneBuilder, SignMethod, Solid};
 use firsthit_geometry::{Precision, Ray};
@@ -44,6 +45,28 @@ pub struct Scene {
     pub(crate) mask: u32,
     /// By how inside is told from outside; made when it is first asked about.
     pub(crate) solids: Mutex<Vec<(Option<SignMethod>, Arc<Solid>)>>,
+    /// What was last seen by masks of single calls, the latest at the end.
+    views: Mutex<Vec<Arc<Self>>>,
+}
+
+/// So many of them are kept.
+const VIEWS: usize = 8;
+
+/// What a call is about: the scene itself, or what is seen of it by the call's mask.
+enum Seen<'a> {
+    All(&'a Scene),
+    Masked(Arc<Scene>),
+}
+
+impl Deref for Seen<'_> {
+    type Target = Scene;
+
+    fn deref(&self) -> &Scene {
+        match self {
+            Self::All(scene) => scene,
+            Self::Masked(scene) => scene,
+        }
+    }
 }
 
 /// How trees are built, by name.
@@ -108,17 +131,40 @@ impl Scene {
         let pool = pool(threads)?;
         let scene = py.detach(|| pool.install(|| mesh.build(options))).map_err(error::value)?;
         let (source, warnings) = (Source::Arrays(Arc::new(mesh)), Vec::new());
-        Ok(Self { scene, source, warnings, mask: u32::MAX, solids: Mutex::default() })
+        Ok(Self { scene, source, warnings, mask: u32::MAX, solids: Mutex::default(), views: Mutex::default() })
     }
 
     /// As this one, but of other trees.
     pub(crate) fn of_trees(&self, scene: firsthit_accel::Scene, source: Source) -> Self {
-        Self { scene, source, warnings: self.warnings.clone(), mask: self.mask, solids: Mutex::default() }
+        Self {
+            scene,
+            source,
+            warnings: self.warnings.clone(),
+            mask: self.mask,
+            solids: Mutex::default(),
+            views: Mutex::default(),
+        }
     }
 
     /// With instances of these layers only.
     fn masked(&self, mask: u32) -> Self {
         Self { mask, ..self.of_trees(self.scene.seen_by(mask), self.source.clone()) }
+    }
+
+    /// What a call with this mask is about.
+    fn seen(&self, py: Python<'_>, mask: Option<u32>) -> Seen<'_> {
+        let Some(mask) = mask.filter(|mask| *mask != self.mask) else { return Seen::All(self) };
+        // It is locked only for a look, never while Python may be let go.
+        let views = || self.views.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = views().iter().find(|view| view.mask == mask).cloned();
+        Seen::Masked(known.unwrap_or_else(|| {
+            let view = Arc::new(py.detach(|| self.masked(mask)));
+            let mut views = views();
+            let most = views.len().saturating_sub(VIEWS - 1);
+            views.drain(..most);
+            views.push(view.clone());
+            view
+        }))
     }
 
     fn open(py: Python<'_>, source: Source, options: BuildOptions, threads: usize) -> PyResult<Self> {
@@ -130,7 +176,7 @@ impl Scene {
                 PyResult::Ok((scene, warnings))
             })
         })?;
-        Ok(Self { scene, source, warnings, mask: u32::MAX, solids: Mutex::default() })
+        Ok(Self { scene, source, warnings, mask: u32::MAX, solids: Mutex::default(), views: Mutex::default() })
     }
 
     pub(crate) fn trees(&self) -> &firsthit_accel::Scene {
@@ -235,7 +281,7 @@ impl Scene {
         py.detach(|| self.masked(mask))
     }
 
-    #[pyo3(signature = (rays, directions=None, *, t_min=None, t_max=None, threads=0))]
+    #[pyo3(signature = (rays, directions=None, *, t_min=None, t_max=None, mask=None, threads=0))]
     fn closest_hit(
         &self,
         py: Python<'_>,
@@ -243,21 +289,23 @@ impl Scene {
         directions: Option<&Bound<'_, PyAny>>,
         t_min: Option<&Bound<'_, PyAny>>,
         t_max: Option<&Bound<'_, PyAny>>,
+        mask: Option<u32>,
         threads: usize,
     ) -> PyResult<Hits> {
         let rays = Rays::new(rays, directions, t_min, t_max)?;
+        let seen = self.seen(py, mask);
         let view = rays.view();
         let mut found = Found::zeroed(rays.count);
         let parts = found.slots().chunks(CHUNK);
         in_chunks(py, (rays.count, |i| view.ray(i)), threads, parts, |rays, mut part: Slots<'_>| {
             if let [ray] = rays {
-                return part.set(0, self.scene.closest_hit(ray).as_ref());
+                return part.set(0, seen.scene.closest_hit(ray).as_ref());
             }
             // On the stack: it is filled anew for each few, and stays near.
             let mut hits = [None; 64];
             for (k, rays) in rays.chunks(hits.len()).enumerate() {
                 let hits = &mut hits[..rays.len()];
-                self.scene.closest_hits(rays, hits);
+                seen.scene.closest_hits(rays, hits);
                 for (i, hit) in hits.iter().enumerate() {
                     part.set(64 * k + i, hit.as_ref());
                 }
@@ -267,7 +315,7 @@ impl Scene {
     }
 
     /// The name of the slice form in Rust: here one does it all.
-    #[pyo3(signature = (rays, directions=None, *, t_min=None, t_max=None, threads=0))]
+    #[pyo3(signature = (rays, directions=None, *, t_min=None, t_max=None, mask=None, threads=0))]
     fn closest_hits(
         &self,
         py: Python<'_>,
@@ -275,12 +323,13 @@ impl Scene {
         directions: Option<&Bound<'_, PyAny>>,
         t_min: Option<&Bound<'_, PyAny>>,
         t_max: Option<&Bound<'_, PyAny>>,
+        mask: Option<u32>,
         threads: usize,
     ) -> PyResult<Hits> {
-        self.closest_hit(py, rays, directions, t_min, t_max, threads)
+        self.closest_hit(py, rays, directions, t_min, t_max, mask, threads)
     }
 
-    #[pyo3(signature = (rays, directions=None, *, t_min=None, t_max=None, threads=0))]
+    #[pyo3(signature = (rays, directions=None, *, t_min=None, t_max=None, mask=None, threads=0))]
     fn any_hit<'py>(
         &self,
         py: Python<'py>,
@@ -288,14 +337,16 @@ impl Scene {
         directions: Option<&Bound<'py, PyAny>>,
         t_min: Option<&Bound<'py, PyAny>>,
         t_max: Option<&Bound<'py, PyAny>>,
+        mask: Option<u32>,
         threads: usize,
     ) -> PyResult<Bound<'py, PyAny>> {
         let rays = Rays::new(rays, directions, t_min, t_max)?;
+        let seen = self.seen(py, mask);
         let view = rays.view();
-        each(py, &rays.shape, |i| view.ray(i), threads, |rays, hits| self.scene.any_hits(rays, hits))
+        each(py, &rays.shape, |i| view.ray(i), threads, |rays, hits| seen.scene.any_hits(rays, hits))
     }
 
-    #[pyo3(signature = (rays, directions=None, *, t_min=None, t_max=None, crossings="triangles", threads=0))]
+    #[pyo3(signature = (rays, directions=None, *, t_min=None, t_max=None, crossings="triangles", mask=None, threads=0))]
     fn count_hits<'py>(
         &self,
         py: Python<'py>,
@@ -304,16 +355,18 @@ impl Scene {
         t_min: Option<&Bound<'py, PyAny>>,
         t_max: Option<&Bound<'py, PyAny>>,
         crossings: &str,
+        mask: Option<u32>,
         threads: usize,
     ) -> PyResult<Bound<'py, PyAny>> {
         let crossings = self::crossings(crossings)?;
         let rays = Rays::new(rays, directions, t_min, t_max)?;
+        let seen = self.seen(py, mask);
         let view = rays.view();
-        let count = |rays: &[Ray<f64>], counts: &mut [u32]| self.scene.count_hits_each(rays, crossings, counts);
+        let count = |rays: &[Ray<f64>], counts: &mut [u32]| seen.scene.count_hits_each(rays, crossings, counts);
         each(py, &rays.shape, |i| view.ray(i), threads, count)
     }
 
-    #[pyo3(signature = (rays, directions=None, *, t_min=None, t_max=None, crossings="triangles", threads=0))]
+    #[pyo3(signature = (rays, directions=None, *, t_min=None, t_max=None, crossings="triangles", mask=None, threads=0))]
     fn all_hits(
         &self,
         py: Python<'_>,
@@ -322,15 +375,17 @@ impl Scene {
         t_min: Option<&Bound<'_, PyAny>>,
         t_max: Option<&Bound<'_, PyAny>>,
         crossings: &str,
+        mask: Option<u32>,
         threads: usize,
     ) -> PyResult<HitLists> {
         let crossings = self::crossings(crossings)?;
         let rays = Rays::new(rays, directions, t_min, t_max)?;
+        let seen = self.seen(py, mask);
         let mut lists = vec![firsthit_accel::HitLists::default(); rays.count.div_ceil(CHUNK)];
         let parts: Vec<_> = lists.iter_mut().collect();
         let view = rays.view();
         in_chunks(py, (rays.count, |i| view.ray(i)), threads, parts, |rays, list| {
-            *list = self.scene.all_hits_each(rays, crossings);
+            *list = seen.scene.all_hits_each(rays, crossings);
         })?;
         let (splits, found) = py.detach(|| {
             let total = lists.iter().map(|l| l.hits().len()).sum();
@@ -351,58 +406,63 @@ impl Scene {
         Ok(HitLists::new(rays.shape, splits, found))
     }
 
-    #[pyo3(signature = (points, *, radius=None, threads=0))]
+    #[pyo3(signature = (points, *, radius=None, mask=None, threads=0))]
     fn closest_point(
         &self,
         py: Python<'_>,
         points: &Bound<'_, PyAny>,
         radius: Option<&Bound<'_, PyAny>>,
+        mask: Option<u32>,
         threads: usize,
     ) -> PyResult<ClosestPoints> {
-        points::closest(self, py, points, radius, threads)
+        points::closest(&self.seen(py, mask), py, points, radius, threads)
     }
 
-    #[pyo3(signature = (points, *, threads=0))]
+    #[pyo3(signature = (points, *, mask=None, threads=0))]
     fn distance<'py>(
         &self,
         py: Python<'py>,
         points: &Bound<'py, PyAny>,
+        mask: Option<u32>,
         threads: usize,
     ) -> PyResult<Bound<'py, PyAny>> {
-        points::distance(self, py, points, threads)
+        points::distance(&self.seen(py, mask), py, points, threads)
     }
 
-    #[pyo3(signature = (points, *, sign="auto", threads=0))]
+    #[pyo3(signature = (points, *, sign="auto", mask=None, threads=0))]
     fn signed_distance<'py>(
         &self,
         py: Python<'py>,
         points: &Bound<'py, PyAny>,
         sign: &str,
+        mask: Option<u32>,
         threads: usize,
     ) -> PyResult<Bound<'py, PyAny>> {
-        points::signed_distance(self, py, points, sign, threads)
+        points::signed_distance(&self.seen(py, mask), py, points, sign, threads)
     }
 
-    #[pyo3(signature = (points, *, sign="auto", threads=0))]
+    #[pyo3(signature = (points, *, sign="auto", mask=None, threads=0))]
     fn contains<'py>(
         &self,
         py: Python<'py>,
         points: &Bound<'py, PyAny>,
         sign: &str,
+        mask: Option<u32>,
         threads: usize,
     ) -> PyResult<Bound<'py, PyAny>> {
-        points::contains(self, py, points, sign, threads)
+        points::contains(&self.seen(py, mask), py, points, sign, threads)
     }
 
-    #[pyo3(signature = (points, *, sign="auto", threads=0))]
+    #[pyo3(signature = (points, *, sign="auto", mask=None, threads=0))]
     fn winding_number<'py>(
         &self,
         py: Python<'py>,
         points: &Bound<'py, PyAny>,
         sign: &str,
+        mask: Option<u32>,
         threads: usize,
     ) -> PyResult<Bound<'py, PyAny>> {
-        points::winding_number(self, py, points, sign, threads)
+        points::winding_number(&self.seen(py, mask), py, points, sign, threads)
     }
 
     fn is_watertight(&self, py: Python<'_>) -> PyResult<bool> {

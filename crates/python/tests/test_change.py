@@ -71,6 +71,33 @@ def test_masks_choose_instances():
     assert scene.with_transforms(moved([0, 0, 1], [0, 0, 2], [0, 0, 4])).seen_by(1).closest_hit(DOWN).t_hit == 6
 
 
+def test_masks_of_single_calls():
+    closed = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], "f4")
+    scene = firsthit.Scene(corners, closed, transforms=moved([0, 0, 0], [0, 0, 3]), masks=[1, 2])
+    ray, point = [0.1, 0.1, 10, 0, 0, -1], [0.1, 0.1, 3.1]
+    queries = [
+        lambda of, **mask: of.closest_hit(ray, **mask).t_hit,
+        lambda of, **mask: of.closest_hits(ray, **mask).t_hit,
+        lambda of, **mask: of.any_hit(ray, **mask),
+        lambda of, **mask: of.count_hits(ray, crossings="surfaces", **mask),
+        lambda of, **mask: of.all_hits([ray], **mask).t_hit.tolist(),
+        lambda of, **mask: of.closest_point(point, **mask).distance,
+        lambda of, **mask: of.distance(point, **mask),
+        lambda of, **mask: of.signed_distance(point, **mask),
+        lambda of, **mask: of.contains(point, **mask),
+        lambda of, **mask: of.winding_number(point, **mask),
+    ]
+    # More masks than are kept, twice.
+    for mask in [*range(12), *range(12)]:
+        for query in queries:
+            assert query(scene, mask=mask) == query(scene.seen_by(mask)), mask
+            assert query(scene.seen_by(2), mask=mask) == query(scene.seen_by(mask)), mask
+    assert [scene.contains(point, mask=mask) for mask in (None, 1, 2, 4)] == [True, False, True, False]
+    with pytest.raises((OverflowError, TypeError)):
+        scene.any_hit(ray, mask=-1)
+
+
 def test_pictures_show_what_the_mask_sees():
     camera = dict(width=8, height=8, samples=1, position=(0.5, 0.5, 0.5), focal_point=(0.5, 0.5, 0), view_up=(0, 1, 0), transparent=True)
     scene = firsthit.Scene(SQUARE, TRIANGLES, transforms=moved([0, 0, 0], [9, 0, 0]), masks=[1, 2])

@@ -177,9 +177,11 @@ class Scene:
         *,
         t_min: ArrayLike | None = None,
         t_max: ArrayLike | None = None,
+        mask: int | None = None,
         threads: int = 0,
     ) -> Hits:
-        """What each ray meets first. Of several triangles at the same ``t``, that of the smallest id."""
+        """What each ray meets first. Of several triangles at the same ``t``, that of the smallest id. With a ``mask``, as of
+        `seen_by` (what that takes is kept for the next calls); so all queries."""
     def closest_hits(
         self,
         rays: ArrayLike,
@@ -187,6 +189,7 @@ class Scene:
         *,
         t_min: ArrayLike | None = None,
         t_max: ArrayLike | None = None,
+        mask: int | None = None,
         threads: int = 0,
     ) -> Hits:
         """`closest_hit`."""
@@ -197,6 +200,7 @@ class Scene:
         *,
         t_min: ArrayLike | None = None,
         t_max: ArrayLike | None = None,
+        mask: int | None = None,
         threads: int = 0,
     ) -> NDArray[np.bool_]:
         """Whether each ray meets anything."""
@@ -208,6 +212,7 @@ class Scene:
         t_min: ArrayLike | None = None,
         t_max: ArrayLike | None = None,
         crossings: _Crossings = "triangles",
+        mask: int | None = None,
         threads: int = 0,
     ) -> NDArray[np.uint32]:
         """How often each ray meets something.
@@ -223,18 +228,19 @@ class Scene:
         t_min: ArrayLike | None = None,
         t_max: ArrayLike | None = None,
         crossings: _Crossings = "triangles",
+        mask: int | None = None,
         threads: int = 0,
     ) -> HitLists:
         """Everything that each ray meets; for ``crossings`` see `count_hits`."""
     def closest_point(
-        self, points: ArrayLike, *, radius: ArrayLike | None = None, threads: int = 0
+        self, points: ArrayLike, *, radius: ArrayLike | None = None, mask: int | None = None, threads: int = 0
     ) -> ClosestPoints:
         """The nearest point of the triangles, for points of shape ``(..., 3)``; with a radius, one for all or one for
         each, only if it is not farther."""
-    def distance(self, points: ArrayLike, *, threads: int = 0) -> NDArray[np.float64]:
+    def distance(self, points: ArrayLike, *, mask: int | None = None, threads: int = 0) -> NDArray[np.float64]:
         """How far the triangles are; infinity if there are none, NaN for a point that is not finite."""
     def signed_distance(
-        self, points: ArrayLike, *, sign: _Sign = "auto", threads: int = 0
+        self, points: ArrayLike, *, sign: _Sign = "auto", mask: int | None = None, threads: int = 0
     ) -> NDArray[np.float64]:
         """`distance`, negative inside.
 
@@ -243,10 +249,12 @@ class Scene:
         or by the normals at the nearest point. ``"auto"`` is winding, for closed meshes of mixed orientation parity.
         The first call takes a look at the whole mesh.
         """
-    def contains(self, points: ArrayLike, *, sign: _Sign = "auto", threads: int = 0) -> NDArray[np.bool_]:
+    def contains(
+        self, points: ArrayLike, *, sign: _Sign = "auto", mask: int | None = None, threads: int = 0
+    ) -> NDArray[np.bool_]:
         """Whether points are inside; for ``sign`` see `signed_distance`. On the surface it is either."""
     def winding_number(
-        self, points: ArrayLike, *, sign: _Sign = "auto", threads: int = 0
+        self, points: ArrayLike, *, sign: _Sign = "auto", mask: int | None = None, threads: int = 0
     ) -> NDArray[np.float64]:
         """How often the surface winds around points: 1 inside of a closed mesh, 0 outside, a fraction where it is
         open. Only ``"fast_winding"`` is an approximation."""
