@@ -145,11 +145,19 @@ pub(crate) fn delta(farthest: f64, magnitude: f64, off: f64) -> f64 {
 
 /// `t` (local, counted from the true origin) as an end of the box tests' interval, on the side where no box is missed.
 #[inline(always)]
-pub(crate) fn box_t(t: f64, shift: f64, side: f64) -> f32 {
-    let local = t - shift;
-    // Entry into a box has four roundings in f32 (and one more is made here), `local` and `t` have a few in f64.
-    let error = local.abs() * (16.0 * U) + (t.abs() + shift.abs()) * (16.0 * f64::UNIT_ROUNDOFF);
-    (local + side * error).to_f32()
+pub(crate) fn box_t(t: f64, shift: f64, side: f32) -> f32 {
+    let local = (t - shift).to_f32();
+    local + side * (local.abs() * OFF + slack(shift))
+}
+
+/// How far an end of the boxes' interval may be off, relative: entry into a box has four roundings in f32, and some more are made
+/// of the end.
+pub(crate) const OFF: f32 = 24.0 * f32::UNIT_ROUNDOFF;
+
+/// The same of an origin that was moved, absolute: `t` is counted from the true one, with a few roundings in f64.
+#[inline(always)]
+pub(crate) fn slack(shift: f64) -> f32 {
+    (shift.abs() * (64.0 * f64::UNIT_ROUNDOFF)).to_f32()
 }
 
 /// A ray in an object's normalised space. Its parameter is `world t * t_scale`.
@@ -318,7 +326,7 @@ impl LocalRay {
     }
 
     #[inline(always)]
-    fn box_t(&self, t: f64, side: f64) -> f32 {
+    fn box_t(&self, t: f64, side: f32) -> f32 {
         box_t(t * self.t_scale, self.shift, side)
     }
 

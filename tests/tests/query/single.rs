@@ -1,7 +1,7 @@
 //! Single rays take a shorter way at the tiers that are asked most: the same bits as the way of all queries.
 
 use firsthit_accel::{BuildOptions, Crossings, Geometry, Layout, Level, Scene, SceneBuilder};
-use firsthit_geometry::{Precision, Ray};
+use firsthit_geometry::{Precision, Ray, Shape, shapes::Sphere};
 use glam::{DAffine3, DQuat, DVec3, Vec3};
 use proptest::prelude::*;
 
@@ -154,6 +154,61 @@ proptest! {
                         for (t_min, t_max) in [(ray.t_min, hit.t), (hit.t, ray.t_max), (ray.t_min, hit.t.next_down())] {
                             same(&scene, &Ray { t_min, t_max, ..ray })?;
                         }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Meshes placed several times (apart, on top of each other, far away), one hidden, with a shape among them: closest and any hit
+    /// by the tree above in single precision, and as all queries find them.
+    #[test]
+    fn several_instances_are_asked_as_all_queries_ask_them(
+        (positions, triangles) in mesh(), places in prop::collection::vec(place(), 2..7), aims in prop::collection::vec(aim(), 40),
+        (shape, hidden, twice) in (0u8..3, 0usize..6, prop::bool::ANY), spread in prop::sample::select(vec![0.0, 1.0, 1e4, 1e20]),
+    ) {
+        let size = positions.iter().fold(0.0f32, |m, p| m.max(p.abs().max_element()));
+        let apart = |k: usize| DVec3::new(k as f64, 0.5 * k as f64, -0.3) * (spread * f64::from(size));
+        let mut places: Vec<_> =
+            places.iter().enumerate().map(|(k, p)| DAffine3::from_translation(apart(k)) * *p).collect();
+        if twice {
+            places.push(places[0]);
+        }
+        for simd in Level::ALL {
+            let precision = Precision::Robust;
+            let mut builder = SceneBuilder::new(BuildOptions { precision, simd, ..BuildOptions::default() });
+            let mesh = builder.add_mesh(vec![Geometry::Triangles { positions: positions.clone(), triangles: triangles.clone() }]);
+            for place in &places {
+                builder.add_instance(mesh, *place);
+            }
+            if hidden < places.len() {
+                builder.set_mask(hidden, 2);
+            }
+            if shape > 0 {
+                let at = if shape == 1 { apart(1) } else { DVec3::ZERO };
+                let ball = Sphere::new(at, f64::from(size)).map_err(|e| TestCaseError::fail(e.to_string()))?;
+                let ball = builder.add_mesh(vec![Geometry::Shape(Shape::Sphere(ball))]);
+                builder.add_instance(ball, DAffine3::IDENTITY);
+            }
+            let scene = builder.build().map_err(|e| TestCaseError::fail(e.to_string()))?.seen_by(1);
+            for (k, aim) in aims.iter().enumerate() {
+                let place = places[k % places.len()];
+                let corners: Vec<[DVec3; 3]> =
+                    triangles.iter().map(|t| t.map(|i| place.transform_point3(positions[i as usize].as_dvec3()))).collect();
+                let ray = ray(*aim, &corners, f64::from(size));
+                same(&scene, &ray)?;
+                if let Some(hit) = scene.closest_hit(&ray) {
+                    for (t_min, t_max) in [(ray.t_min, hit.t), (hit.t, ray.t_max), (ray.t_min, hit.t.next_down())] {
+                        same(&scene, &Ray { t_min, t_max, ..ray })?;
+                    }
+                    // From a surface the triangle that is left may be left out.
+                    let point = scene.surface_point(&ray, &hit);
+                    let direction = ray.direction.cross(hit.normal()).normalize_or(DVec3::X) + hit.normal();
+                    if direction.is_finite() && point.error.is_finite() {
+                        let away = Ray::new(point.spawn(direction), direction);
+                        let next = scene.closest_hit(&away);
+                        prop_assert_eq!(bits(&next), bits(&scene.closest_hit_from(&away, hit.id)));
+                        prop_assert_eq!(next.is_some(), scene.any_hit_from(&away, hit.id));
                     }
                 }
             }

@@ -5,10 +5,10 @@
 //! direction before it is scaled, boxes that are met as if larger by no less than is needed, but by the same for all rays that
 //! start nearby. What comes later (the scaled direction, the line in double precision) is worked out beside.
 
-use firsthit_geometry::{Ray, Real, transform::Transform};
+use firsthit_geometry::{Ray, transform::Transform};
 use glam::{DVec3, Vec3};
 
-use crate::local::{Extent, Line, LocalRay, U};
+use crate::local::{Extent, Line, LocalRay, OFF, slack};
 use crate::scene::is_interval;
 use crate::simd::{Four, Lanes};
 use crate::wide::{FARTHEST, SMALLEST, in_lanes};
@@ -36,10 +36,6 @@ pub(crate) struct Entered<L: Lanes> {
 /// Directions whose largest component lies between this and its reciprocal have room for reciprocals before they are
 /// scaled.
 const LEAST: f64 = 1.0 / (1u32 << 20) as f64;
-
-/// How far the ends of the boxes' interval may be off, relative: 16 roundings of boxes, and some of the ends' own. See
-/// [`box_t`](crate::local::box_t).
-pub(crate) const OFF: f32 = 24.0 * U as f32;
 
 /// The last lane is of no use.
 #[inline(always)]
@@ -85,8 +81,10 @@ impl<L: Lanes> Entered<L> {
         let delta = if apart.le(L::Four::splat(near)) & 7 == 7 { least_delta } else { delta };
         let (scale, unscale) = size.powers();
         let scale32 = L::narrow_four(scale);
-        // As small, once it is scaled, as what `Boxes` takes for a component, or smaller.
-        let inverse = reciprocals(L::narrow_four(direction), SMALLEST * LEAST as f32).mul(scale32);
+        // Of what is smaller than `SMALLEST`, once it is scaled, that reciprocal is taken that `Boxes` would take.
+        let short = L::narrow_four(direction);
+        let inverse = reciprocals(short.abs(), SMALLEST * LEAST as f32).mul(scale32);
+        let inverse = inverse.min(L::splat(1.0 / SMALLEST)).turned_by(short);
         let direction = direction.mul(unscale);
         let ends = L::narrow_four(L::Four::new(ray.t_min, ray.t_max, ray.t_min, ray.t_max)).mul(scale32);
         let out = ends.abs().mul(L::load(&[-OFF, OFF, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]));
@@ -129,7 +127,7 @@ impl<L: Lanes> Entered<L> {
             direction,
             inverse: reciprocals(direction, SMALLEST),
             interval: [ray.box_t_min(ray.world[0]), ray.box_t_max(ray.world[1])],
-            slack: (ray.shift.abs() * (64.0 * f64::UNIT_ROUNDOFF)).to_f32(),
+            slack: slack(ray.shift),
         })
     }
 

@@ -12,7 +12,7 @@ use core::ops::ControlFlow;
 
 use firsthit_geometry::{Ray, transform::Transform};
 
-pub(crate) use enter::{OFF, four, reciprocals};
+pub(crate) use enter::{four, reciprocals};
 pub(crate) use tier::Lean;
 
 use crate::model::Model;
