@@ -44,6 +44,14 @@ impl Accumulator {
         }
     }
 
+    /// [`Accumulator::add`] so many times.
+    #[inline]
+    pub(crate) fn add_times(&mut self, value: [f32; 4], times: u32) {
+        for _ in 0..times {
+            self.add(value);
+        }
+    }
+
     /// An estimate of the variance of the mean of each colour: how far it is off, squared. It comes from how much
     /// whole blocks of 16 samples differ, so it knows what samples gain by their order within a block, but not what
     /// blocks gain by theirs. `None` before there are two blocks.
@@ -350,6 +358,7 @@ impl Band<'_> {
     ///
     /// # Panics
     /// When it is not in this band.
+    #[inline]
     #[must_use]
     pub fn pixel(&mut self, x: u32, y: u32) -> &mut [Accumulator] {
         assert!(self.columns().contains(&x) && self.rows().contains(&y), "pixel ({x}, {y}) is in another band");

@@ -579,7 +579,7 @@ impl<'a> Job<'a> {
         monitor: &dyn Monitor,
     ) -> Done {
         let mut done = Done::default();
-        let mut shots = Shots::default();
+        let (mut shots, mut sky) = (Shots::default(), None);
         // What was done before on this thread is of others.
         let _ = Tally::take();
         // Pixels beside and below each other go together: they see the same part of the tree and the same texels.
@@ -601,18 +601,19 @@ impl<'a> Job<'a> {
                     let samples = samples.start.max(from)..samples.end;
                     if self.empty.as_ref().is_some_and(|empty| empty.at(x, y)) {
                         done.samples += u64::from(samples.end.saturating_sub(samples.start));
-                        done.bad += self.behind(tracer, band.pixel(x, y), (x, y), samples, splats);
+                        done.bad += self.behind(tracer, band.pixel(x, y), (x, y), samples, splats, &mut sky);
                         continue;
                     }
                     let profiled = self.options.profile && matches!(self.method, Method::Path(_));
                     let place = x.wrapping_mul(31).wrapping_add(y.wrapping_mul(17));
                     let timed = place.is_multiple_of(if profiled { PROFILED } else { TIMED });
                     tracer.clock = Some(clock).filter(|_| profiled && timed);
+                    let sampler = self.sampler((x, y));
                     for sample in samples {
                         let started = tracer.clock.map(|_| Instant::now());
-                        let (shot, ray) = self.shot(tracer, (x, y), sample, timed);
-                        let begun = started.map(|s| s.elapsed());
-                        shots.push(Shot { begun, ..shot }, ray);
+                        let (mut shot, ray) = self.shot(tracer, (x, y), sampler.at(sample), timed);
+                        shot.begun = started.map(|s| s.elapsed());
+                        shots.push(shot, ray);
                         if shots.are_many() {
                             done.bad += self.shoot(tracer, clock, band, &mut shots, splats);
                         }
@@ -629,16 +630,21 @@ impl<'a> Job<'a> {
         done
     }
 
+    /// The sample points of a pixel, for its first sample.
+    #[inline]
+    fn sampler(&self, pixel: (u32, u32)) -> PixelSampler {
+        PixelSampler::of(self.options.sampler, self.options.seed, pixel, 0)
+    }
+
     /// Begins a sample: its ray.
     #[inline]
     fn shot<K: Kernel>(
         &self,
         tracer: &Tracer<'_, K>,
         (x, y): (u32, u32),
-        sample: u32,
+        sampler: PixelSampler,
         timed: bool,
     ) -> (Shot, Ray<f64>) {
-        let sampler = PixelSampler::of(self.options.sampler, self.options.seed, (x, y), sample);
         let [dx, dy] = self.filter.offset(tracer.draw2(&sampler, Dimension::Pixel));
         let at = [f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy];
         let ray = if K::RARE && self.camera.has_lens() {
@@ -693,7 +699,8 @@ impl<'a> Job<'a> {
         bad
     }
 
-    /// Takes samples of a pixel where there is nothing but what is behind all; the answer: how many were no light.
+    /// Takes samples of a pixel where there is nothing but what is behind all; the answer: how many were no light. What
+    /// looks the same everywhere is looked at once, for `sky`.
     fn behind<K: Kernel>(
         &self,
         tracer: &mut Tracer<'_, K>,
@@ -701,18 +708,25 @@ impl<'a> Job<'a> {
         at: (u32, u32),
         samples: std::ops::Range<u32>,
         splats: Option<&Splats>,
+        sky: &mut Option<Seen>,
     ) -> u64 {
         tracer.timed = false;
         tracer.clock = None;
+        let first = self.sampler(at);
+        let mut look = |sample| {
+            let (shot, ray) = self.shot(tracer, at, first.at(sample), false);
+            let mut seen = self.look(tracer, &shot, ray, None);
+            add_splats(&mut seen, splats, at);
+            seen
+        };
         let mut bad = 0;
-        let mut same = None;
+        if self.even && splats.is_none() {
+            let count = samples.len() as u32;
+            let seen = sky.get_or_insert_with(|| look(samples.start));
+            return u64::from(self.keep(pixel, seen, TraversalCounts::default(), count));
+        }
         for sample in samples {
-            let seen = same.unwrap_or_else(|| {
-                let (shot, ray) = self.shot(tracer, at, sample, false);
-                self.look(tracer, &shot, ray, None, splats)
-            });
-            same = Some(seen).filter(|_| self.even);
-            bad += u64::from(!self.keep(pixel, seen, TraversalCounts::default()));
+            bad += u64::from(self.keep(pixel, &look(sample), TraversalCounts::default(), 1));
         }
         bad
     }
@@ -727,13 +741,14 @@ impl<'a> Job<'a> {
         hit: Option<Hit>,
         splats: Option<&Splats>,
     ) -> bool {
-        let mut seen = self.look(tracer, shot, ray, hit, splats);
+        let mut seen = self.look(tracer, shot, ray, hit);
+        add_splats(&mut seen, splats, shot.pixel);
         let heat = self.aovs.contains(&Aov::Heat) || matches!(self.method, Method::Values(Aov::Heat, _));
         let cost = if heat { tracer.stage.accel.closest_hit_counted(&ray).1 } else { TraversalCounts::default() };
         if let (Method::Values(aov, far), Some(first)) = (self.method, &seen.first) {
             seen.color = first.shown(aov, cost, far);
         }
-        self.keep(pixel, seen, cost)
+        self.keep(pixel, &seen, cost, 1) == 0
     }
 
     /// What a sample sees.
@@ -741,35 +756,29 @@ impl<'a> Job<'a> {
     fn look<K: Kernel>(
         &self,
         tracer: &mut Tracer<'_, K>,
-        &Shot { pixel: (x, y), sampler, screen, .. }: &Shot,
+        &Shot { sampler, screen, .. }: &Shot,
         ray: Ray<f64>,
         hit: Option<Hit>,
-        splats: Option<&Splats>,
     ) -> Seen {
-        let mut seen = match self.method {
+        match self.method {
             Method::Path(_) | Method::Forward(_) => tracer.path(ray, hit, self.cone, screen, sampler, self.limits()),
             Method::Light(_) => tracer.radiance(ray, self.cone, screen, sampler, self.limits()),
             Method::Occlusion(reach) => tracer.ambient_occlusion(ray, reach, sampler),
             Method::Values(..) => tracer.values(ray, self.cone),
-        };
-        if let Some(splats) = splats {
-            seen.color += splats.at(x, y);
         }
-        seen
     }
 
-    /// Adds what a sample saw to its pixel; false if its numbers were no light.
+    /// Adds what some samples saw, all the same, to their pixel; the answer: how many of them were no light.
     #[inline]
-    fn keep(&self, pixel: &mut [Accumulator], seen: Seen, cost: TraversalCounts) -> bool {
-        let good = is_light(&seen);
-        let first = seen.first;
-        let Seen { color, alpha, .. } = if good { seen } else { Seen { alpha: 1.0, ..Seen::default() } };
-        pixel[0].add([color.x, color.y, color.z, alpha.clamp(0.0, 1.0)]);
+    fn keep(&self, pixel: &mut [Accumulator], seen: &Seen, cost: TraversalCounts, times: u32) -> u32 {
+        let good = is_light(seen);
+        let (color, alpha) = if good { (seen.color, seen.alpha) } else { (Vec3::ZERO, 1.0) };
+        pixel[0].add_times([color.x, color.y, color.z, alpha.clamp(0.0, 1.0)], times);
         for (i, aov) in self.aovs.iter().enumerate() {
-            let value = first.map_or([0.0; 4], |first| first.value(*aov, cost).extend(1.0).to_array());
-            pixel[1 + i].add(if value.iter().all(|v| v.is_finite()) { value } else { [0.0; 4] });
+            let value = seen.first.as_ref().map_or([0.0; 4], |first| first.value(*aov, cost).extend(1.0).to_array());
+            pixel[1 + i].add_times(if value.iter().all(|v| v.is_finite()) { value } else { [0.0; 4] }, times);
         }
-        good
+        if good { 0 } else { times }
     }
 }
 
@@ -797,6 +806,13 @@ fn last_pass(sample: u32) -> u32 {
         1..4 => 1,
         4..16 => 4,
         n => n / 16 * 16,
+    }
+}
+
+/// What the lights' own paths bring to a pixel.
+fn add_splats(seen: &mut Seen, splats: Option<&Splats>, (x, y): (u32, u32)) {
+    if let Some(splats) = splats {
+        seen.color += splats.at(x, y);
     }
 }
 

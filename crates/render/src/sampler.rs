@@ -137,6 +137,13 @@ impl PixelSampler {
         Self { key, sample: sample.reverse_bits(), place, independent: choice == SamplerChoice::Independent }
     }
 
+    /// The same for another sample of the pixel.
+    #[inline]
+    #[must_use]
+    pub(crate) fn at(self, sample: u32) -> Self {
+        Self { sample: sample.reverse_bits(), ..self }
+    }
+
     /// Points for one of several branches of a path, or one of several lights: independent of all other branches'.
     #[inline]
     #[must_use]

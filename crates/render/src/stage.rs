@@ -283,7 +283,7 @@ impl Stage {
         }
         let environment = environment.filter(|e| effects.contains(EffectSet::ENVIRONMENT) && !e.is_black());
         let lights = Lights {
-            choice: LightChoice::new(&punctual, &area, environment.as_ref(), studio),
+            choice: LightChoice::new(&punctual, &area, environment.as_ref(), studio, is_followed(effects)),
             punctual,
             area,
             environment,
@@ -335,7 +335,8 @@ impl Stage {
         let accel = self.accel.with_transforms(&places).map_err(|e| StageError::Motion(e.to_string()))?;
         let world = World::new(Arc::clone(self.scene()), places);
         let area = glowing(&world, &self.materials, &self.dark, self.plan.simulated());
-        let choice = LightChoice::new(&self.lights.punctual, &area, self.lights.environment.as_ref(), studio);
+        let followed = is_followed(self.plan.simulated());
+        let choice = LightChoice::new(&self.lights.punctual, &area, self.lights.environment.as_ref(), studio, followed);
         Ok(Self { world, accel, lights: Lights { area, choice, ..self.lights.clone() }, ..self.clone() })
     }
 
@@ -415,6 +416,11 @@ impl Stage {
     }
 }
 
+/// Whether paths meet what glows and what is around by chance.
+fn is_followed(effects: EffectSet) -> bool {
+    effects.contains(EffectSet::INDIRECT_LIGHT)
+}
+
 /// The glowing surfaces of a scene.
 fn glowing(world: &World, materials: &[Material], dark: &Dark, effects: EffectSet) -> AreaLights {
     if !effects.contains(EffectSet::AREA_LIGHTS) {
@@ -430,6 +436,7 @@ fn glowing(world: &World, materials: &[Material], dark: &Dark, effects: EffectSe
                 both_sides: m.glows_on_both_sides(),
                 even: m.glows_evenly(),
                 by_view: m.glow_depends_on_view(),
+                most: m.brightest_glow(),
             };
             Some(of(id)).filter(|m| m.glows()).map(glow)
         },

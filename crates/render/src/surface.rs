@@ -1,5 +1,6 @@
 //! What shading knows about the point that a ray meets: normals, texture coordinates, colours.
 
+use std::cell::Cell;
 use std::sync::Arc;
 
 use firsthit_accel::{Hit, HitId, SurfacePoint};
@@ -10,6 +11,7 @@ use glam::{DAffine3, DMat3, DVec3, Mat3, Vec2, Vec3, Vec4};
 
 use crate::integrator::clock::Clock;
 use crate::material::Colors;
+use crate::texture::{TextureLookup, View};
 use crate::{EffectSet, tally};
 
 /// The scene's geometry with what shading needs beside the trees.
@@ -30,6 +32,8 @@ pub(crate) struct Instance {
     vectors: Mat3,
     /// From the mesh's normals to the world's (not unit).
     normals: Mat3,
+    /// -1 where left and right are exchanged, else 1.
+    mirrored: f32,
 }
 
 impl World {
@@ -47,6 +51,7 @@ impl World {
                     inverse,
                     vectors: transform.matrix3.as_mat3(),
                     normals: inverse.transpose().as_mat3(),
+                    mirrored: transform.matrix3.as_mat3().determinant().signum(),
                 }
             })
             .collect();
@@ -54,12 +59,14 @@ impl World {
     }
 
     /// Index of the material of a geometry; `materials` (one past the last) is the default material.
+    #[inline]
     pub(crate) fn material(&self, id: HitId) -> usize {
         let mesh = self.instances[id.instance as usize].mesh;
         let default = self.scene.materials.len();
         self.scene.meshes[mesh].geometries[id.geometry as usize].material.unwrap_or(default)
     }
 
+    #[inline]
     fn part(&self, id: HitId, u: f32, v: f32) -> Part<'_> {
         let instance = &self.instances[id.instance as usize];
         match &self.scene.meshes[instance.mesh].geometries[id.geometry as usize].surface {
@@ -122,10 +129,13 @@ impl World {
             geometric: Vec3::Z,
             smooth: Vec3::Z,
             curved: false,
+            turned: false,
             cone: 0.0,
             width: 0.0,
             colors: Colors::All(1),
             seen: None,
+            chance: 0.0,
+            view: Cell::new(None),
             dark: false,
             clock: None,
         }
@@ -142,12 +152,12 @@ impl World {
         let geometric = if front { outward } else { -outward };
         let instance = &self.instances[hit.id.instance as usize];
         let part = self.part(hit.id, hit.u, hit.v);
-        let (mut smooth, mut curved) = (geometric, false);
+        let (mut smooth, mut curved, mut turned) = (geometric, false, false);
         if let Some(n) = part.vertex_normal() {
             let n = instance.normals * n;
             // Vertex normals that disagree with the winding are turned with it.
-            let n = if n.dot(geometric) < 0.0 { -n } else { n };
-            smooth = n.try_normalize().unwrap_or(geometric);
+            turned = n.dot(geometric) < 0.0;
+            smooth = (if turned { -n } else { n }).try_normalize().unwrap_or(geometric);
             curved = true;
         }
         Surface {
@@ -160,10 +170,13 @@ impl World {
             geometric,
             smooth,
             curved,
+            turned,
             cone: width,
             width,
             colors: Colors::All(1),
             seen: None,
+            chance: chance(hit),
+            view: Cell::new(None),
             dark: false,
             clock: None,
         }
@@ -200,7 +213,7 @@ struct Look {
 }
 
 /// A point of a surface as shading sees it. All directions are unit and in the world.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Surface<'a> {
     pub(crate) id: HitId,
     instance: &'a Instance,
@@ -217,6 +230,8 @@ pub(crate) struct Surface<'a> {
     pub(crate) smooth: Vec3,
     /// Whether there are vertex normals.
     curved: bool,
+    /// Whether these look to the other side.
+    turned: bool,
     /// Width of the camera's view here, world units.
     cone: f32,
     /// Width of what is seen here as one: of that, or of all that a scattered path stands for.
@@ -225,6 +240,10 @@ pub(crate) struct Surface<'a> {
     pub(crate) colors: Colors,
     /// What textures of the first set are asked for, once that is known.
     seen: Option<Look>,
+    /// A number from 0 to 1 by which one of two levels of textures is chosen.
+    chance: f32,
+    /// The view of a texture that was asked for last, with its layout and footprint.
+    view: Cell<Option<(u32, f32, View)>>,
     /// It is known not to glow.
     pub(crate) dark: bool,
     /// Times the look-ups of textures here.
@@ -265,7 +284,41 @@ impl Surface<'_> {
         }));
     }
 
+    /// Where a texture is read here.
+    #[inline]
+    pub(crate) fn view(&self, texture: &TextureLookup) -> View {
+        self.view_within(texture, self.footprint(texture.uv_set()))
+    }
+
+    /// The same seen as sharply as by the camera.
+    #[inline]
+    pub(crate) fn sharp_view(&self, texture: &TextureLookup) -> View {
+        self.view_within(texture, self.sharp_footprint(texture.uv_set()))
+    }
+
+    /// The same this far away in texture coordinates.
+    #[inline]
+    pub(crate) fn view_beside(&self, texture: &TextureLookup, way: Vec2) -> View {
+        let set = texture.uv_set();
+        texture.view(self.uv(set) + way, self.footprint(set), self.chance)
+    }
+
+    /// Most materials have several textures that are laid out alike: they are read at the same places.
+    #[inline]
+    fn view_within(&self, texture: &TextureLookup, footprint: f32) -> View {
+        let layout = texture.layout();
+        match self.view.get() {
+            Some((known, width, view)) if known == layout && width == footprint => view,
+            _ => {
+                let view = texture.view(self.uv(texture.uv_set()), footprint, self.chance);
+                self.view.set(Some((layout, footprint, view)));
+                view
+            }
+        }
+    }
+
     /// Texture coordinates; (0, 0) where the mesh lacks the set.
+    #[inline]
     pub(crate) fn uv(&self, set: usize) -> Vec2 {
         if let (Some(look), 0) = (self.seen, set) {
             return look.uv;
@@ -297,6 +350,7 @@ impl Surface<'_> {
     }
 
     /// How wide what is seen as one is in texture coordinates.
+    #[inline]
     pub(crate) fn footprint(&self, set: usize) -> f32 {
         match (self.seen, set) {
             (Some(look), 0) => look.footprint,
@@ -307,6 +361,7 @@ impl Surface<'_> {
 
     /// How wide the camera's view is in texture coordinates: of what light asks for as well as sight, which must be the
     /// same to both.
+    #[inline]
     pub(crate) fn sharp_footprint(&self, set: usize) -> f32 {
         match (self.seen, set) {
             (Some(look), 0) => look.sharp,
@@ -388,10 +443,12 @@ impl Surface<'_> {
                 let t: Vec4 = (0..3).map(|i| mesh.tangents[corners[i]] * weights[i]).sum();
                 let tangent = (self.instance.vectors * t.truncate()).try_normalize()?;
                 // The vertex normal, not turned to the winding: that is what the tangents were made with.
-                let normal = self.instance.normals * self.part.vertex_normal().unwrap_or(Vec3::ZERO);
-                let normal = normal.try_normalize().unwrap_or(outward);
-                let mirrored = self.instance.vectors.determinant().signum();
-                Some([tangent, normal.cross(tangent) * (t.w.signum() * mirrored)])
+                let normal = match self.curved {
+                    true if self.turned => -self.smooth,
+                    true => self.smooth,
+                    false => outward,
+                };
+                Some([tangent, normal.cross(tangent) * (t.w.signum() * self.instance.mirrored)])
             }
             // An image's v runs downwards, a normal map's y upwards.
             _ => self.along_uv(set).map(|[u, v]| [u, -v]),
@@ -433,6 +490,13 @@ impl Surface<'_> {
         }
         blend(fine)
     }
+}
+
+/// A number in [0, 1) that looks random from hit to hit: of where on its primitive it is.
+#[inline]
+fn chance(hit: &Hit) -> f32 {
+    let mixed = (hit.u.to_bits() ^ hit.v.to_bits().rotate_left(16)).wrapping_mul(0x9e37_79b9);
+    ((mixed ^ (mixed >> 15)).wrapping_mul(0x846c_a68b) >> 8) as f32 * (1.0 / (1 << 24) as f32)
 }
 
 /// A width, if it is one.

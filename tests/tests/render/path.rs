@@ -105,6 +105,29 @@ fn a_rectangle_lights_a_plane_by_its_form_factor() {
     }
 }
 
+/// In even light, which nobody asks, a dim lamp is seldom asked, and a bright one always: the light is the same.
+#[test]
+fn a_lamp_in_an_even_sky_gives_its_light_however_seldom_it_is_asked() {
+    let (a, b, h) = (1.5, 0.8, 1.2);
+    let share = below_corner(a, b, h);
+    let mut asked = Vec::new();
+    for radiance in [0.5f32, 3.0, 100.0] {
+        let mut scene = scene_of(&[diffuse(0.7), glow(radiance)]);
+        quad(&mut scene, DVec3::new(-10.0, 0.0, 10.0), DVec3::X * 20.0, DVec3::Z * -20.0, 0);
+        quad(&mut scene, DVec3::new(0.0, h, 0.0), DVec3::X * a, DVec3::Z * b, 1);
+        let scene = surrounded(scene, 1.0);
+        let found = probe(&scene).depth(1).from(DVec3::new(-1.0, 1.0, -1.0)).spp(16384).look(DVec3::ZERO).x;
+        // The lamp takes the place of its part of the sky.
+        assert_near(found, 0.7 * (f64::from(radiance) * share + (1.0 - share)), 5e-3);
+        let options = RenderOptions { integrator: IntegratorChoice::Path, ..small(4) };
+        let mut setup = StageOptions::default();
+        let eye = DVec3::new(-1.0, 1.0, -1.0);
+        (setup.camera_changes.position, setup.camera_changes.focal_point) = (Some(eye), Some(DVec3::ZERO));
+        asked.push(common::render_scene(&scene, &setup, &options).stats.rays[RayKind::ShadowArea]);
+    }
+    assert!(asked[0] > 0 && 3 * asked[0] < asked[2] && asked[1] <= asked[2], "{asked:?}");
+}
+
 #[test]
 fn a_ball_of_light_lights_a_plane_as_if_by_its_middle() {
     let (center, radius) = (DVec3::new(1.0, 2.0, 0.0), 0.6);

@@ -104,12 +104,12 @@ impl<'a, K: Kernel> Scatter<'a, K> {
     pub(super) fn towards(&self, wi: Vec3) -> Towards {
         let mut towards = Towards { followed: Vec3::ZERO, others: Vec3::ZERO, pdf: 0.0 };
         for (lobe, chance) in self.bsdf.lobes().iter().zip(self.chances) {
-            let f = lobe.eval::<K>(self.wo, wi);
             if chance > 0.0 {
+                let (f, pdf) = lobe.eval_and_pdf::<K>(self.wo, wi);
                 towards.followed += f;
-                towards.pdf += chance * lobe.pdf::<K>(self.wo, wi);
+                towards.pdf += chance * pdf;
             } else {
-                towards.others += f;
+                towards.others += lobe.eval::<K>(self.wo, wi);
             }
         }
         towards
@@ -142,8 +142,9 @@ impl<'a, K: Kernel> Scatter<'a, K> {
         let (mut f, mut pdf) = (sample.weight * own, chance * own);
         for (i, (other, chance)) in lobes.iter().zip(self.chances).enumerate() {
             if i != index && chance > 0.0 {
-                f += other.eval::<K>(self.wo, sample.wi);
-                pdf += chance * other.pdf::<K>(self.wo, sample.wi);
+                let (other, density) = other.eval_and_pdf::<K>(self.wo, sample.wi);
+                f += other;
+                pdf += chance * density;
             }
         }
         let weight = f / pdf;

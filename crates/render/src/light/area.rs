@@ -314,6 +314,8 @@ pub(crate) struct Glow {
     pub(crate) even: bool,
     /// Not the same in all directions.
     pub(crate) by_view: bool,
+    /// Radiance where it is brightest, if its texture shows nothing beyond white.
+    pub(crate) most: f32,
 }
 
 /// Glowing surfaces of a scene.
@@ -325,6 +327,8 @@ pub(crate) struct AreaLights {
     own: bool,
     /// Glowing shapes that cannot be sampled: they are seen, but light nothing but mirrors.
     pub(crate) unsampled: usize,
+    /// The most radiance of any.
+    brightest: f32,
 }
 
 impl AreaLights {
@@ -339,12 +343,14 @@ impl AreaLights {
     ) -> Self {
         let mut area = Self { shapes: lights.collect(), ..Self::default() };
         area.own = !area.shapes.is_empty();
+        area.brightest = area.shapes.iter().map(|l| l.radiance.max_element()).fold(0.0, f32::max);
         let (mut triangles, mut weights, mut first) = (Vec::<GlowingTriangle>::new(), Vec::new(), HashMap::new());
         let mut parts = Vec::new();
         for (i, instance) in world.instances.iter().enumerate() {
             for (g, geometry) in world.scene.meshes[instance.mesh].geometries.iter().enumerate() {
                 let id = HitId { instance: i as u32, geometry: g as u32, primitive: 0 };
-                let Some(Glow { both_sides, even, by_view }) = glowing(id) else { continue };
+                let Some(Glow { both_sides, even, by_view, most }) = glowing(id) else { continue };
+                area.brightest = area.brightest.max(most);
                 match &geometry.surface {
                     SurfaceDesc::Triangles(mesh) => {
                         first.insert((id.instance, id.geometry), parts.len());
@@ -421,6 +427,11 @@ impl AreaLights {
         let own = self.shapes.iter().filter(|l| l.id.is_none());
         let hits = own.filter_map(|l| l.hit(ray).map(|t| (t, l)));
         hits.min_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    /// About the radiance of the brightest, by its brightest colour.
+    pub(crate) fn brightest(&self) -> f32 {
+        self.brightest
     }
 
     /// Whether there are lights of their own.

@@ -1,5 +1,7 @@
 //! Which light to ask: one for each point, in proportion to about how much each gives there.
 
+use std::f32::consts::PI;
+
 use glam::{DVec3, Vec3};
 
 use super::area::AreaLights;
@@ -40,18 +42,24 @@ pub(crate) struct LightChoice {
     distant: Vec<u32>,
     /// About the irradiance from around; 0: it is not to be asked.
     environment: f32,
+    /// In even light, which paths find without asking, and where they can find all lights too: the noise (radiance x
+    /// irradiance) that a unit of the lights' irradiance would leave to paths alone, over that which the even light leaves
+    /// to them. 0: lights are always asked.
+    contrast: f32,
 }
 
 /// No kind of light that gives anything is asked less often than this: what stands in the way is not known.
 const LEAST_SHARE: f32 = 0.1;
 
 impl LightChoice {
-    /// A light at the camera counts only `with_headlight`: it is there for want of other light.
+    /// A light at the camera counts only `with_headlight`: it is there for want of other light. `followed`: paths go on
+    /// from surface to surface, so that they may meet all that has an extent.
     pub(crate) fn new(
         punctual: &[PunctualLight],
         area: &AreaLights,
         environment: Option<&Environment>,
         with_headlight: bool,
+        followed: bool,
     ) -> Self {
         let mut choice = Self { shapes: area.shapes.len(), ..Self::default() };
         let mut bounds: Vec<LightBounds> = Vec::new();
@@ -68,9 +76,16 @@ impl LightChoice {
         area.bounds(&mut bounds);
         choice.tree = LightTree::new(&bounds);
         // A constant one is found by following surfaces at least as well.
-        choice.environment = environment
-            .filter(|e| !e.is_constant())
-            .map_or(0.0, |e| std::f32::consts::PI * luminance(e.mean_radiance()));
+        choice.environment =
+            environment.filter(|e| !e.is_constant()).map_or(0.0, |e| PI * luminance(e.mean_radiance()));
+        if punctual.is_empty()
+            && let Some(even) = environment.filter(|e| followed && e.is_constant())
+        {
+            // Chance finds light with a variance of about radiance x irradiance.
+            let radiance = luminance(even.mean_radiance());
+            let contrast = area.brightest() / (PI * radiance * radiance);
+            choice.contrast = if contrast.is_finite() { contrast } else { 0.0 };
+        }
         choice
     }
 
@@ -88,7 +103,7 @@ impl LightChoice {
     /// Whether there is nothing to choose: it is always the same light.
     #[inline]
     pub(crate) fn is_single(&self) -> bool {
-        self.distant.is_empty() && self.environment == 0.0 && self.tree.is_single()
+        self.distant.is_empty() && self.environment == 0.0 && self.contrast == 0.0 && self.tree.is_single()
     }
 
     /// How a point divides its questions.
@@ -96,7 +111,7 @@ impl LightChoice {
     pub(crate) fn shares(&self, punctual: &[PunctualLight], to: &Receiver) -> Shares {
         // Where there is but one kind, nothing is to be divided.
         if self.distant.is_empty() && self.environment == 0.0 {
-            return Shares { tree: 1.0, ..Shares::default() };
+            return Shares { tree: self.share_beside_even_light(to), ..Shares::default() };
         }
         let distant: f32 = self.distant.iter().map(|i| Self::of_distant(&punctual[*i as usize], to)).sum();
         let tree = self.tree.total(to);
@@ -117,7 +132,14 @@ impl LightChoice {
         Shares { environment, distant: rest * of_distant, tree: rest * (1.0 - of_distant) }
     }
 
-    /// Chooses a light, and says with which probability.
+    /// How often lights are asked at all: beside even light only in proportion to the noise that they would leave to
+    /// paths, where it is less.
+    #[inline]
+    fn share_beside_even_light(&self, to: &Receiver) -> f32 {
+        if self.contrast > 0.0 { (self.contrast * self.tree.total(to)).clamp(LEAST_SHARE, 1.0) } else { 1.0 }
+    }
+
+    /// Chooses a light, and says with which probability. `None`: none is asked this time.
     #[inline]
     pub(crate) fn sample(
         &self,
@@ -133,10 +155,11 @@ impl LightChoice {
         if u < shares.distant {
             return self.sample_distant(punctual, shares, to, u / shares.distant);
         }
-        if !(shares.tree > 0.0) {
+        let u = (u - shares.distant) / shares.tree;
+        if !(shares.tree > 0.0) || (self.contrast > 0.0 && u >= 1.0) {
             return None;
         }
-        let u = ((u - shares.distant) / shares.tree).clamp(0.0, 1.0 - f32::EPSILON / 2.0);
+        let u = u.clamp(0.0, 1.0 - f32::EPSILON / 2.0);
         let (i, p) = self.tree.sample(to, u)?;
         let p = p * shares.tree;
         Some(if let Some(light) = self.placed.get(i) {

@@ -228,7 +228,7 @@ impl Layers {
         if let Some(t) = brushed.texture.as_ref().filter(|_| K::TEXTURES) {
             set = t.uv_set();
             tally::look_up(EffectSet::ANISOTROPY);
-            let texel = surface.look_up(|| t.color(surface.uv(set), surface.footprint(set)));
+            let texel = surface.look_up(|| t.color_at(&surface.view(t)));
             let along = texel.xy() * 2.0 - 1.0;
             direction = brushed.rotation.rotate(along.try_normalize().unwrap_or(Vec2::X));
             strength *= texel.z;
@@ -274,7 +274,7 @@ pub(super) fn mapped<K: Kernel>(surface: &Surface<'_>, texture: Option<&TextureL
     let t = texture.filter(|_| K::TEXTURES)?;
     tally::sample(EffectSet::NORMAL_MAPS);
     tally::look_up(EffectSet::NORMAL_MAPS);
-    let texel = surface.look_up(|| t.color(surface.uv(t.uv_set()), surface.footprint(t.uv_set())));
+    let texel = surface.look_up(|| t.color_at(&surface.view(t)));
     let n = (texel.xyz() * 2.0 - 1.0) * Vec3::new(scale, scale, 1.0);
     if n.is_finite() && n.xy() != Vec2::ZERO { surface.mapped_normal(n, t.uv_set()) } else { None }
 }

@@ -24,7 +24,7 @@ use pbr::Pbr;
 
 use crate::kernel::Kernel;
 use crate::surface::Surface;
-use crate::texture::{ColorSpace, Texture, TextureLookup};
+use crate::texture::{ColorSpace, Layout, Texture, TextureLookup};
 use crate::{EffectSet, StageError, tally};
 
 /// Smoothest surface that is treated as rough: below it, a delta function is nearer to the truth than f32.
@@ -90,6 +90,8 @@ pub(crate) struct Textures<'a> {
     images: &'a [ImageDesc],
     mips: bool,
     made: Made,
+    /// All ways in which textures are laid out.
+    layouts: Vec<Layout>,
 }
 
 /// For each image what was made of it: as data, and as colours.
@@ -97,7 +99,7 @@ pub(crate) type Made = Vec<[Option<Arc<Texture>>; 2]>;
 
 impl<'a> Textures<'a> {
     pub(crate) fn new(images: &'a [ImageDesc], mips: bool) -> Self {
-        Self { images, mips, made: vec![[None, None]; images.len()] }
+        Self { images, mips, made: vec![[None, None]; images.len()], layouts: Vec::new() }
     }
 
     /// Takes over what was made of images whose pixels are the very same.
@@ -124,7 +126,7 @@ impl<'a> Textures<'a> {
             Some(texture) => texture.clone(),
             None => slot.insert(Arc::new(Texture::new(&self.images[reference.image], space)?)).clone(),
         };
-        Ok(Some(TextureLookup::new(texture, reference, self.mips)))
+        Ok(Some(TextureLookup::new(texture, reference, self.mips).numbered(&mut self.layouts)))
     }
 }
 
@@ -254,6 +256,15 @@ impl Material {
             Model::Pbr(pbr) | Model::Layered(pbr) => pbr.glows(),
             Model::Emission(radiance) => radiance.max_element() > 0.0,
             _ => false,
+        }
+    }
+
+    /// Radiance of its glow where that is brightest, by its brightest colour, if no texture shows more than white.
+    pub(crate) fn brightest_glow(&self) -> f32 {
+        match &self.model {
+            Model::Pbr(pbr) | Model::Layered(pbr) => pbr.brightest_glow(),
+            Model::Emission(radiance) => radiance.max_element(),
+            _ => 0.0,
         }
     }
 

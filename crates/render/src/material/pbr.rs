@@ -79,14 +79,14 @@ pub(super) fn absorption(desc: &PbrMaterial, conventions: Conventions) -> Vec3 {
 /// The share of the colour texture, scalar textures and vertex colour of a point: 1 where there is none.
 pub(super) fn scalar<K: Kernel>(lookup: Option<&TextureLookup>, surface: &Surface<'_>) -> f32 {
     match lookup {
-        Some(t) if K::TEXTURES => surface.look_up(|| t.scalar(surface.uv(t.uv_set()), surface.footprint(t.uv_set()))),
+        Some(t) if K::TEXTURES => surface.look_up(|| t.scalar_at(&surface.view(t))),
         _ => 1.0,
     }
 }
 
 pub(super) fn color<K: Kernel>(lookup: Option<&TextureLookup>, surface: &Surface<'_>) -> glam::Vec4 {
     match lookup {
-        Some(t) if K::TEXTURES => surface.look_up(|| t.color(surface.uv(t.uv_set()), surface.footprint(t.uv_set()))),
+        Some(t) if K::TEXTURES => surface.look_up(|| t.color_at(&surface.view(t))),
         _ => glam::Vec4::ONE,
     }
 }
@@ -188,7 +188,11 @@ impl Pbr {
     }
 
     pub(super) fn glows(&self) -> bool {
-        self.emissive.max_element() > 0.0 && !self.unlit
+        self.brightest_glow() > 0.0
+    }
+
+    pub(super) fn brightest_glow(&self) -> f32 {
+        if self.unlit { 0.0 } else { self.emissive.max_element() }
     }
 
     pub(super) fn emissive_texture(&self) -> Option<&TextureLookup> {
@@ -278,8 +282,7 @@ impl Pbr {
         tally::sample(EffectSet::EMISSION);
         let mut emission = self.emissive;
         if let Some(t) = self.emissive_texture.as_ref().filter(|_| K::TEXTURES) {
-            let set = t.uv_set();
-            emission *= surface.look_up(|| t.color(surface.uv(set), surface.sharp_footprint(set))).xyz();
+            emission *= surface.look_up(|| t.color_at(&surface.sharp_view(t))).xyz();
         }
         match self.layers.as_deref().filter(|_| K::LAYERS) {
             Some(layers) => emission * layers.under_coat::<K>(surface, !conventions.reference),
@@ -292,7 +295,7 @@ impl Pbr {
         let (metallic, roughness) = (self.metallic_texture.as_ref(), self.roughness_texture.as_ref());
         let shares = match (metallic, roughness) {
             (Some(m), Some(r)) if K::TEXTURES && self.one_lookup => {
-                surface.look_up(|| m.scalars(r, surface.uv(m.uv_set()), surface.footprint(m.uv_set())))
+                surface.look_up(|| m.scalars_at(r, &surface.view(m)))
             }
             _ => [scalar::<K>(metallic, surface), scalar::<K>(roughness, surface)],
         };
@@ -440,11 +443,10 @@ impl Pbr {
         let mut normal = layers::mapped::<K>(surface, self.normal_texture.as_ref(), self.normal_scale);
         if let Some(t) = &self.bump_texture {
             tally::sample(EffectSet::NORMAL_MAPS);
-            let (uv, width) = (surface.uv(t.uv_set()), surface.footprint(t.uv_set()));
-            let step = t.texel_step().max(width);
+            let step = t.texel_step().max(surface.footprint(t.uv_set()));
             let height = |du, dv| {
                 tally::look_up(EffectSet::NORMAL_MAPS);
-                surface.look_up(|| t.scalar(uv + glam::Vec2::new(du, dv), width))
+                surface.look_up(|| t.scalar_at(&surface.view_beside(t, glam::Vec2::new(du, dv))))
             };
             let half = 0.5 * step;
             let slope = glam::Vec2::new(height(half, 0.0) - height(-half, 0.0), height(0.0, half) - height(0.0, -half))

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use firsthit_import::scene::{Channel, Filter, TextureRef, Wrap};
 use glam::{Affine2, Vec2, Vec4, Vec4Swizzles};
 
-use super::{All, One, Texture};
+use super::{All, One, Texture, View};
 use crate::light::environment::luminance;
 
 /// A texture as a material uses it: how to look it up, and what to take from it.
@@ -21,6 +21,18 @@ pub struct TextureLookup {
     channel: Channel,
     value_scale: f32,
     value_offset: f32,
+    /// Of its [`Layout`] among those of all materials.
+    layout: u32,
+}
+
+/// All that decides where a texture is read at a point of a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Layout {
+    size: (u32, u32),
+    uv_set: usize,
+    transform: Affine2,
+    wrap: [Wrap; 2],
+    mode: Mode,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,7 +67,54 @@ impl TextureLookup {
             },
             value_scale: reference.value_scale,
             value_offset: reference.value_offset,
+            layout: 0,
             texture,
+        }
+    }
+
+    /// Gives it the number of its layout among others.
+    pub(crate) fn numbered(mut self, layouts: &mut Vec<Layout>) -> Self {
+        let TextureLookup { uv_set, transform, wrap, mode, .. } = self;
+        let own = Layout { size: self.texture.size(), uv_set, transform, wrap, mode };
+        let known = layouts.iter().position(|l| *l == own);
+        self.layout = known.unwrap_or_else(|| {
+            layouts.push(own);
+            layouts.len() - 1
+        }) as u32;
+        self
+    }
+
+    /// Textures of one number are read at the same places, wherever they are looked up.
+    #[inline]
+    pub(crate) fn layout(&self) -> u32 {
+        self.layout
+    }
+
+    /// Where it is read at a mesh's texture coordinates. Of two levels that are to be mixed `chance`, from 0 to 1, takes
+    /// one: on average over many samples that is the same, for half of the texels. Pharr et al., "Filtering After Shading
+    /// With Stochastic Texture Filtering" (2024).
+    #[inline]
+    pub(crate) fn view(&self, uv: Vec2, footprint: f32, chance: f32) -> View {
+        let at = self.transform.transform_point2(uv);
+        match self.mode {
+            Mode::Nearest => self.texture.view_nearest(self.wrap, at),
+            Mode::Bilinear => self.texture.view_one_of(self.wrap, at, 0.0, 0.0),
+            Mode::Trilinear => self.texture.view_one_of(self.wrap, at, footprint * self.texels_per_uv, chance),
+        }
+    }
+
+    /// The linear colour and alpha there.
+    #[inline]
+    pub(crate) fn color_at(&self, view: &View) -> Vec4 {
+        self.scaled(self.texture.read(view, All))
+    }
+
+    /// The channel that the reference names there.
+    #[inline]
+    pub(crate) fn scalar_at(&self, view: &View) -> f32 {
+        match self.number() {
+            Some(channel) => self.texture.read(view, One(channel)) * self.value_scale + self.value_offset,
+            None => self.pick(self.texture.read(view, All)),
         }
     }
 
@@ -71,7 +130,11 @@ impl TextureLookup {
     #[inline]
     #[must_use]
     pub fn color(&self, uv: Vec2, footprint: f32) -> Vec4 {
-        let value = self.lookup(uv, footprint);
+        self.scaled(self.lookup(uv, footprint))
+    }
+
+    #[inline]
+    fn scaled(&self, value: Vec4) -> Vec4 {
         (value.xyz() * self.value_scale + self.value_offset).extend(value.w)
     }
 
@@ -79,21 +142,19 @@ impl TextureLookup {
     #[inline]
     #[must_use]
     pub fn scalar(&self, uv: Vec2, footprint: f32) -> f32 {
-        let channel = match self.channel {
-            Channel::Red => 0,
-            Channel::Green => 1,
-            Channel::Blue => 2,
-            Channel::Alpha => 3,
-            Channel::Luminance => return self.pick(self.lookup(uv, footprint)),
-        };
-        // Of most images only this channel has to be decoded.
-        let at = self.transform.transform_point2(uv);
-        let value = match self.mode {
-            Mode::Nearest => return self.pick(self.lookup(uv, footprint)),
-            Mode::Bilinear => self.texture.filtered(self.wrap, at, 0.0, One(channel)),
-            Mode::Trilinear => self.texture.filtered(self.wrap, at, footprint * self.texels_per_uv, One(channel)),
-        };
-        value * self.value_scale + self.value_offset
+        self.pick(self.lookup(uv, footprint))
+    }
+
+    /// Of most images only one channel has to be decoded: which.
+    #[inline]
+    fn number(&self) -> Option<usize> {
+        match self.channel {
+            Channel::Red => Some(0),
+            Channel::Green => Some(1),
+            Channel::Blue => Some(2),
+            Channel::Alpha => Some(3),
+            Channel::Luminance => None,
+        }
     }
 
     #[inline]
@@ -139,17 +200,17 @@ impl TextureLookup {
                 == (other.uv_set, other.transform, other.wrap, other.mode)
     }
 
-    /// [`TextureLookup::scalar`] of this and of one that [reads as](TextureLookup::reads_as) it.
+    /// [`TextureLookup::scalar_at`] of this and of one that [reads as](TextureLookup::reads_as) it.
     #[inline]
-    pub(crate) fn scalars(&self, other: &Self, uv: Vec2, footprint: f32) -> [f32; 2] {
-        let value = self.lookup(uv, footprint);
+    pub(crate) fn scalars_at(&self, other: &Self, view: &View) -> [f32; 2] {
+        let value = self.texture.read(view, All);
         [self.pick(value), other.pick(value)]
     }
 
     fn lookup(&self, uv: Vec2, footprint: f32) -> Vec4 {
         let uv = self.transform.transform_point2(uv);
         match self.mode {
-            Mode::Nearest => self.texture.nearest(self.wrap, uv),
+            Mode::Nearest => self.texture.read(&self.texture.view_nearest(self.wrap, uv), All),
             Mode::Bilinear => self.texture.filtered(self.wrap, uv, 0.0, All),
             Mode::Trilinear => self.texture.filtered(self.wrap, uv, footprint * self.texels_per_uv, All),
         }

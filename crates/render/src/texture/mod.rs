@@ -15,6 +15,7 @@ use firsthit_import::scene::{ImageDesc, Pixels, Wrap};
 use glam::{Vec2, Vec4};
 
 use level::Level;
+pub(crate) use lookup::Layout;
 pub use lookup::TextureLookup;
 pub(crate) use wrap::floor;
 use wrap::{fold, neighbours};
@@ -100,20 +101,21 @@ impl Texture {
         *self.grey.get_or_init(|| texels.iter().all(|[r, g, b, _]| r == g && g == b))
     }
 
-    fn nearest(&self, wrap: [Wrap; 2], uv: Vec2) -> Vec4 {
+    /// The texel at a point of the whole image, by itself.
+    fn view_nearest(&self, wrap: [Wrap; 2], uv: Vec2) -> View {
         let level = &self.levels[0];
-        let pick = |wrap, t, n| (fold(wrap, t) * n as f32) as u32;
-        self.texel(pick(wrap[0], uv.x, level.width), pick(wrap[1], uv.y, level.height))
+        let pick = |wrap, t, n| ((fold(wrap, t) * n as f32) as u32).min(n - 1);
+        let (x, y) = (pick(wrap[0], uv.x, level.width), pick(wrap[1], uv.y, level.height));
+        View { level: 0, x: [x; 2], y: [y; 2], mix: [0.0; 2] }
     }
 
-    /// `at`: folded coordinates.
+    /// The texels around a point of one level. `at`: folded coordinates.
     #[inline]
-    fn bilinear<R: Reading>(&self, level: usize, wrap: [Wrap; 2], at: Vec2, reading: R) -> R::Value {
-        let level = &self.levels[level];
-        let (x, fx) = neighbours(wrap[0], at.x, level.width);
-        let (y, fy) = neighbours(wrap[1], at.y, level.height);
-        let [a, b, c, d] = reading.four(level, self.space, x, y);
-        R::lerp(R::lerp(a, b, fx), R::lerp(c, d, fx), fy)
+    fn view_level(&self, level: usize, wrap: [Wrap; 2], at: Vec2) -> View {
+        let Level { width, height, .. } = self.levels[level];
+        let (x, across) = neighbours(wrap[0], at.x, width);
+        let (y, down) = neighbours(wrap[1], at.y, height);
+        View { level: level as u32, x, y, mix: [across, down] }
     }
 
     /// The two levels between which something `width` texels of the whole image wide is looked at, and how far it is
@@ -132,11 +134,41 @@ impl Texture {
     /// `width`: of what is looked at, in texels of the whole image; up to one, that is all that is read.
     #[inline]
     fn filtered<R: Reading>(&self, wrap: [Wrap; 2], uv: Vec2, width: f32, reading: R) -> R::Value {
-        let at = Vec2::new(fold(wrap[0], uv.x), fold(wrap[1], uv.y));
+        let at = fold2(wrap, uv);
         let ([below, above], t) = self.levels_of(width);
-        let value = self.bilinear(below, wrap, at, reading);
-        if t > 0.0 { R::lerp(value, self.bilinear(above, wrap, at, reading), t) } else { value }
+        let value = self.read(&self.view_level(below, wrap, at), reading);
+        if t > 0.0 { R::lerp(value, self.read(&self.view_level(above, wrap, at), reading), t) } else { value }
     }
+
+    /// Of the two levels that [`Texture::filtered`] mixes one, by chance as often as it counts there.
+    #[inline]
+    fn view_one_of(&self, wrap: [Wrap; 2], uv: Vec2, width: f32, chance: f32) -> View {
+        let ([below, above], t) = self.levels_of(width);
+        self.view_level(if chance < t { above } else { below }, wrap, fold2(wrap, uv))
+    }
+
+    #[inline]
+    fn read<R: Reading>(&self, view: &View, reading: R) -> R::Value {
+        let [a, b, c, d] = reading.four(&self.levels[view.level as usize], self.space, view.x, view.y);
+        let [across, down] = view.mix;
+        R::lerp(R::lerp(a, b, across), R::lerp(c, d, across), down)
+    }
+}
+
+#[inline]
+fn fold2(wrap: [Wrap; 2], uv: Vec2) -> Vec2 {
+    Vec2::new(fold(wrap[0], uv.x), fold(wrap[1], uv.y))
+}
+
+/// Where images of one size are read: four texels of one of their levels, and how they are mixed.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct View {
+    level: u32,
+    /// Two columns and two rows.
+    x: [u32; 2],
+    y: [u32; 2],
+    /// How far it is from the first to the second of them.
+    mix: [f32; 2],
 }
 
 /// What is read of texels.

@@ -241,3 +241,35 @@ proptest! {
         prop_assert!((19.9..=190.0).contains(&value), "{value}");
     }
 }
+
+#[test]
+fn a_level_by_chance_is_on_average_the_mix_of_both() {
+    let l =
+        lookup(&rgba8(16, 8, |x, y| [(16 * x) as u8, (30 * y) as u8, (x * y) as u8, 255]), ColorSpace::Srgb, |_| {});
+    let uv = Vec2::new(0.31, 0.77);
+    for footprint in [0.0, 0.05, 0.13, 0.17, 0.4, 3.0, f32::NAN] {
+        const N: u32 = 4096;
+        let chance = |i: u32| (i as f32 + 0.5) / N as f32;
+        let mean = (0..N).map(|i| l.color_at(&l.view(uv, footprint, chance(i)))).sum::<Vec4>() / N as f32;
+        assert!((mean - l.color(uv, footprint)).abs().max_element() < 1e-3, "{footprint}");
+    }
+}
+
+#[test]
+fn textures_have_one_number_where_they_are_read_at_the_same_places() {
+    let image = |width| rgba8(width, 2, |_, _| [0; 4]);
+    let mut layouts = Vec::new();
+    let mut number = |width, space, change: &dyn Fn(&mut TextureRef)| {
+        lookup(&image(width), space, change).numbered(&mut layouts).layout()
+    };
+    let first = number(4, ColorSpace::Srgb, &|_| {});
+    assert_eq!(first, number(4, ColorSpace::Linear, &|r| r.channel = Channel::Green));
+    let others: [&dyn Fn(&mut TextureRef); 4] =
+        [&|r| r.uv_set = 1, &|r| r.wrap_v = Wrap::Clamp, &|r| r.filter = Filter::Nearest, &|r| {
+            r.transform = Affine2::from_scale(Vec2::splat(2.0))
+        }];
+    for other in others {
+        assert_ne!(first, number(4, ColorSpace::Srgb, other));
+    }
+    assert_ne!(first, number(8, ColorSpace::Srgb, &|_| {}));
+}

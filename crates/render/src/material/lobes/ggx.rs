@@ -21,20 +21,23 @@ pub(crate) struct GgxReflection {
 
 impl GgxReflection {
     pub(super) fn eval(&self, wo: Vec3, wi: Vec3) -> Vec3 {
-        if !(wo.z > 0.0 && wi.z > 0.0) {
-            return Vec3::ZERO;
-        }
-        let h = (wo + wi).normalize();
-        let f = self.fresnel.reflectance(wo.dot(h).clamp(0.0, 1.0)) * self.scale;
-        f * (density(h, self.alpha) * g2(wo, wi, self.alpha, self.masking) / (4.0 * wo.z))
+        self.eval_and_pdf(wo, wi).0
     }
 
     pub(super) fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+        self.eval_and_pdf(wo, wi).1
+    }
+
+    #[inline]
+    pub(super) fn eval_and_pdf(&self, wo: Vec3, wi: Vec3) -> (Vec3, f32) {
         if !(wo.z > 0.0 && wi.z > 0.0) {
-            return 0.0;
+            return (Vec3::ZERO, 0.0);
         }
         let h = (wo + wi).normalize();
-        visible_pdf(wo, h, self.alpha) / (4.0 * wo.dot(h))
+        let (cos, density) = (wo.dot(h), density(h, self.alpha) / (4.0 * wo.z));
+        let f = self.fresnel.reflectance(cos.clamp(0.0, 1.0)) * self.scale;
+        // The density of visible facets is wo.h D G1 / wo.z, that of directions a 4 wo.h-th of it.
+        (f * (density * g2(wo, wi, self.alpha, self.masking)), density * g1(wo, self.alpha))
     }
 
     pub(super) fn sample(&self, wo: Vec3, u: [f32; 2]) -> Option<LobeSample> {

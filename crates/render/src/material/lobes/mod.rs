@@ -131,6 +131,15 @@ impl Lobe {
         each!(self, lobe => lobe.pdf(wo, wi), else 0.0)
     }
 
+    /// [`Lobe::eval`] and [`Lobe::pdf`], which may have much in common.
+    #[inline]
+    pub(crate) fn eval_and_pdf<K: Kernel>(&self, wo: Vec3, wi: Vec3) -> (Vec3, f32) {
+        match self {
+            Self::GgxReflection(lobe) => lobe.eval_and_pdf(wo, wi),
+            _ => (self.eval::<K>(wo, wi), self.pdf::<K>(wo, wi)),
+        }
+    }
+
     /// Draws a direction. `None`: the light of this draw is lost.
     pub(crate) fn sample<K: Kernel>(&self, wo: Vec3, u: [f32; 2]) -> Option<LobeSample> {
         each!(self, lobe => lobe.sample(wo, u), else None)
