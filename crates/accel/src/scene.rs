@@ -400,61 +400,35 @@ impl Inner {
             return ControlFlow::Continue(());
         }
         let precision = self.options.precision;
-        self.trace_unbounded::<SURFACES, C, P>(ray, collector, probe)?;
-        let (t_max, ordered) = (collector.t_max(), collector.ordered());
-        self.across::<K, P>(ray, t_max, ordered, probe, |i, probe| {
-            let instance = &self.instances[i as usize];
-            let model = &self.models[instance.model as usize];
-            model.trace::<SURFACES, K, C, P>(ray, (i, &instance.transform), precision, collector, probe)?;
-            ControlFlow::Continue(collector.t_max())
+        for &i in &self.unbounded {
+            let (instance, model) = self.placed(i);
+            if let Some(local) = LocalRay::enter(ray, &instance.transform, model.extent()) {
+                model.trace_unbounded::<SURFACES, C, P>(&local, i, precision, collector, probe)?;
+            }
+        }
+        // A distance in the world has gone through an instance and back: a few roundings more than a box's entry.
+        let beyond = |t: f64| t + t.abs() * (64.0 * f64::UNIT_ROUNDOFF);
+        let before = ray.t_min - ray.t_min.abs() * (64.0 * f64::UNIT_ROUNDOFF);
+        let asked = Asked {
+            off: self.entering(ray),
+            padded: K::PADDED_ABOVE,
+            ordered: collector.ordered(),
+            t_min: before,
+            t_max: beyond(collector.t_max()),
+        };
+        self.above.traverse(ray, &asked, probe, |run, probe| {
+            for &k in run {
+                let i = self.bounded[k as usize];
+                let (instance, model) = self.placed(i);
+                model.trace::<SURFACES, K, C, P>(ray, (i, &instance.transform), precision, collector, probe)?;
+            }
+            ControlFlow::Continue(beyond(collector.t_max()))
         })
     }
 
     /// Whether there are instances with something in them that has no end.
     pub(crate) fn has_unbounded(&self) -> bool {
         !self.unbounded.is_empty()
-    }
-
-    /// Offers hits with what has no end.
-    pub(crate) fn trace_unbounded<const SURFACES: bool, C: Collector, P: Probe>(
-        &self,
-        ray: &Ray<f64>,
-        collector: &mut C,
-        probe: &mut P,
-    ) -> ControlFlow<()> {
-        for &i in &self.unbounded {
-            let instance = &self.instances[i as usize];
-            let model = &self.models[instance.model as usize];
-            if let Some(local) = LocalRay::enter(ray, &instance.transform, model.extent()) {
-                model.trace_unbounded::<SURFACES, C, P>(&local, i, self.options.precision, collector, probe)?;
-            }
-        }
-        ControlFlow::Continue(())
-    }
-
-    /// Visits the instances whose boxes the ray meets up to `t_max`, the nearest first if `ordered`. `visit` answers with the end
-    /// of the interval from there on, or breaks.
-    #[inline(always)]
-    pub(crate) fn across<K: Kernel, P: Probe>(
-        &self,
-        ray: &Ray<f64>,
-        t_max: f64,
-        ordered: bool,
-        probe: &mut P,
-        mut visit: impl FnMut(u32, &mut P) -> ControlFlow<(), f64>,
-    ) -> ControlFlow<()> {
-        // A distance in the world has gone through an instance and back: a few roundings more than a box's entry.
-        let beyond = |t: f64| t + t.abs() * (64.0 * f64::UNIT_ROUNDOFF);
-        let before = ray.t_min - ray.t_min.abs() * (64.0 * f64::UNIT_ROUNDOFF);
-        let asked =
-            Asked { off: self.entering(ray), padded: K::PADDED_ABOVE, ordered, t_min: before, t_max: beyond(t_max) };
-        self.above.traverse(ray, &asked, probe, |run, probe| {
-            let mut t_max = f64::INFINITY;
-            for &k in run {
-                t_max = visit(self.bounded[k as usize], probe)?;
-            }
-            ControlFlow::Continue(beyond(t_max))
-        })
     }
 
     /// An instance, and what is placed by it.
@@ -464,7 +438,7 @@ impl Inner {
         (instance, &self.models[instance.model as usize])
     }
 
-    /// Of that the part that grows with the distance of the ray's origin from the farthest corner.
+    /// By how much of its distance from the farthest corner of the scene a ray is rounded: see [`Inner::entering`].
     pub(crate) fn round_trip(&self) -> f64 {
         self.round_trip
     }

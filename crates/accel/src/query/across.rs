@@ -7,7 +7,7 @@ use core::ops::ControlFlow;
 use firsthit_geometry::{Ray, Real};
 
 use super::direct::{AskAny, AskClosest, Asked, Leaving, Short};
-use super::{Closest, Collect, Whether};
+use super::{Closest, Collect, whether};
 use crate::above::{WIDEST, Wide};
 use crate::instance::Instance;
 use crate::layout::wide8::Reference;
@@ -15,7 +15,7 @@ use crate::local::{FAR, OFF};
 use crate::packet::Tier;
 use crate::scene::is_interval;
 use crate::simd::{self, Four, Lanes, Stack, Work};
-use crate::single::{Only, four, reciprocals};
+use crate::single::{Only, delta_of, four, reciprocals};
 use crate::stats::Off;
 use crate::wide::{Boxes, SMALLEST};
 use crate::{Hit, Scene};
@@ -119,7 +119,7 @@ impl<T: Tier> VisitInstance for First<'_, T> {
                 _ => simd::run(level, Short::<_, _, T>::new(only, asked, ray)),
             }
         } else {
-            let mut any = Whether::new(ray);
+            let mut any = whether(ray);
             let precision = scene.options().precision;
             model.trace::<false, T, _, _>(ray, (i, transform), precision, &mut any, &mut Off).is_break()
         };
@@ -159,14 +159,11 @@ impl<V: VisitInstance> Work for Walk<'_, V> {
         let unscale = L::Four::splat(1.0 / scale);
         let origin = four::<L::Four>(ray.origin).sub(four(center)).mul(unscale);
         let direction = four::<L::Four>(ray.direction).mul(unscale);
-        let [(far, delta), (near, least_delta)] = extent.bounds_of_rays();
-        let (apart, size) = (origin.abs(), direction.abs());
-        let here = apart.le(L::Four::splat(far)) & size.le(L::Four::splat(1.0 / LEAST));
-        let delta = if apart.le(L::Four::splat(near)) & 7 == 7 { least_delta } else { delta };
-        // What `Inner::entering` says, for the farthest of these rays.
         let (_, _, half) = extent.parts();
+        let delta = delta_of(origin.abs(), direction.abs(), LEAST, extent)?;
+        // What `Inner::entering` says, for the farthest of these rays.
         let delta = delta + ((FAR + 3.0) * half * inner.round_trip()).to_f32().next_up();
-        if !(here & 7 == 7 && L::Four::splat(LEAST).le(size) & 7 != 0 && delta < WIDEST) {
+        if !(delta < WIDEST) {
             return None;
         }
         let (origin, direction) = (L::narrow_four(origin), L::narrow_four(direction));

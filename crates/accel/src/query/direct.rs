@@ -7,7 +7,7 @@ use core::ops::ControlFlow;
 use firsthit_geometry::{Precision, Ray};
 
 use super::across::Left;
-use super::{Closest, Collect, Collector, Whether};
+use super::{Closest, Collect, Collector, whether};
 use crate::instance::Instance;
 use crate::kernel::{Double, Exact, Fast, Guarded, Kernel, Robust};
 use crate::layout::compact8::Compact8;
@@ -22,7 +22,7 @@ use crate::wide::WideTree;
 use crate::{Guards, Hit, HitId, Scene};
 
 /// The guards that the tier `Robust` has in queries.
-const NEEDED: Guards = Guards::ALL.difference(Guards::OFFSET);
+pub(super) const NEEDED: Guards = Guards::ALL.difference(Guards::OFFSET);
 
 impl Scene {
     /// The nearest hit in the ray's closed interval; `None` also for an invalid ray.
@@ -215,7 +215,7 @@ impl Asked for AskAny<'_> {
 
     #[inline(always)]
     fn anywhere<K: Kernel>(self, ray: &Ray<f64>) -> bool {
-        let mut any = Whether::new(ray);
+        let mut any = whether(ray);
         self.0.inner().trace_by::<false, K, _, _>(ray, &mut any, &mut Off).is_break()
     }
 
@@ -226,7 +226,7 @@ impl Asked for AskAny<'_> {
 
     #[inline(always)]
     fn whole<L: Lanes, K: Kernel>(self, only: &Only<'_, Wide8>, ray: &Ray<f64>) -> bool {
-        let mut any = Whether::new(ray);
+        let mut any = whether(ray);
         trace::<L, K, _>(only, ray, &mut any).is_break()
     }
 
@@ -541,7 +541,7 @@ impl Inner {
     }
 
     #[inline(always)]
-    fn only(&self) -> Option<(Available, Only<'_, Wide8>)> {
+    pub(super) fn only(&self) -> Option<(Available, Only<'_, Wide8>)> {
         let instance = self.single()?;
         let model = &self.models[instance.model as usize];
         let (tree, level) = model.wide()?;

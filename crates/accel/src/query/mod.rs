@@ -21,7 +21,7 @@ use glam::DVec3;
 
 pub(crate) use all_hits::All;
 pub use all_hits::HitLists;
-pub(crate) use any_hit::{Any, Whether};
+pub(crate) use any_hit::{Any, whether};
 pub(crate) use closest_hit::Closest;
 pub use closest_point::ClosestPoint;
 pub use crossings::Crossings;
@@ -64,6 +64,8 @@ pub(crate) trait Collector {
 pub(crate) trait Take {
     /// Whether finding near hits first helps.
     const ORDERED: bool = true;
+    /// See [`Collector::asks_only_whether`]: for those that take whatever hit there is.
+    const ONLY_WHETHER: bool = false;
     /// Whether a hit in the interval is of any use; only then is the filter asked.
     #[inline(always)]
     fn wants(&self, _: &Hit) -> bool {
@@ -110,6 +112,10 @@ impl<F: FnMut(&Hit) -> bool, T: Take> Collector for Collect<F, T> {
     #[inline(always)]
     fn ordered(&self) -> bool {
         T::ORDERED
+    }
+    #[inline(always)]
+    fn asks_only_whether(&self) -> bool {
+        T::ONLY_WHETHER
     }
 }
 

@@ -5,33 +5,29 @@ use core::ops::ControlFlow;
 
 use firsthit_geometry::transform::Transform;
 use firsthit_geometry::{Precision, Ray};
-use glam::Vec3;
 
 use super::count_hits::Count;
+use super::direct::NEEDED;
 use super::{Collect, Crossings};
-use crate::Guards;
-use crate::kernel::{MOST, Robust, Short, careful_plane, short_plane};
+use crate::kernel::{MOST, Robust, Short, short_plane};
 use crate::layout::wide8::Wide8;
 use crate::local::{Line, LocalRay};
 use crate::model::Model;
-use crate::offer::{OfferTriangle, within_triangle};
+use crate::offer::OfferTriangle;
 use crate::scene::{Inner, is_interval};
 use crate::simd::{self, Available, Lanes, Work};
+use crate::single::{self, careful, tell};
 use crate::stats::Off;
 use crate::wide::{self, Boxes, Sheared, Visit, WideTree, in_lanes};
 
 impl Inner {
     /// Counts the hits of each ray; `false` where this is no such scene, and nothing is done.
     pub(super) fn tally(&self, rays: &[Ray<f64>], crossings: Crossings, counts: &mut [u32]) -> bool {
-        // One guard is for rays that leave surfaces.
-        let guarded = self.options.guards.contains(Guards::ALL.difference(Guards::OFFSET));
-        let [instance] = &self.instances[..] else { return false };
-        let model = &*self.models[instance.model as usize];
-        let Some((tree, level)) = model.wide() else { return false };
-        if self.options.precision != Precision::Robust || !guarded || !instance.shown {
+        if self.options.precision != Precision::Robust || !self.options.guards.contains(NEEDED) {
             return false;
         }
-        let only = Only { model, tree, transform: &instance.transform, surfaces: crossings == Crossings::Surfaces };
+        let Some((level, single::Only { model, tree, transform, .. })) = self.only() else { return false };
+        let only = Only { model, tree, transform, surfaces: crossings == Crossings::Surfaces };
         run(level, Tally { only, rays, counts });
         true
     }
@@ -109,13 +105,6 @@ impl Only<'_> {
     }
 }
 
-/// Where the plane of a triangle is met, with all digits; `None` where that is nowhere.
-#[inline(never)]
-fn careful<const GRAZED: bool>(triangle: [Vec3; 3], line: Line) -> Option<f64> {
-    let plane = careful_plane(triangle, line, GRAZED)?;
-    if GRAZED { within_triangle(line, plane.t, triangle) } else { Some(plane.t) }
-}
-
 /// Counts the triangles in the interval.
 struct Counter<'a> {
     only: Only<'a>,
@@ -131,21 +120,19 @@ struct Counter<'a> {
 impl Visit<Off> for Counter<'_> {
     #[inline(always)]
     fn visit(&mut self, place: usize, known: [f32; 3], _: &mut Off) -> ControlFlow<(), Option<f32>> {
-        // As `Weights::told`, without its division. Where an edge function is 0 a rule tells whose the crossing is.
-        let [e0, e1, e2] = known;
-        let (sum, least) = ((e0 + e1 + e2).abs(), e0.abs().min(e1.abs()).min(e2.abs()));
-        if !((1e-36..=1e36).contains(&sum) & (least > 0.0)) {
+        // Where an edge function is 0 a rule tells whose the crossing is.
+        if !tell(known) {
             self.count += self.only.unclear(*self.ray, place, known);
             return ControlFlow::Continue(None);
         }
         let triangle = WideTree::triangle(self.only.tree, place);
-        let t = match short_plane(&triangle, &self.line, MOST, self.from) {
-            Short::Met(plane) => Some(plane.t),
+        let plane = match short_plane(&triangle, &self.line, MOST, self.from) {
+            Short::Met(plane) => Some(plane),
             Short::Before => return ControlFlow::Continue(None),
             Short::Grazed => careful::<true>(triangle, self.line),
             Short::Lost => careful::<false>(triangle, self.line),
         };
-        match t.map(|t| t * self.unscale) {
+        match plane.map(|plane| plane.t * self.unscale) {
             Some(t) => self.count += u32::from(self.ray.t_min <= t && t <= self.ray.t_max && t.abs() <= f64::MAX),
             // No crossing may be lost where the plane does not tell.
             None => self.count += self.only.unclear(*self.ray, place, known),

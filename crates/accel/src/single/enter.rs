@@ -55,6 +55,18 @@ pub(crate) fn reciprocals<L: Lanes>(direction: L, smallest: f32) -> L {
     L::splat(1.0).div(direction.abs().max(L::splat(smallest)).turned_by(direction))
 }
 
+/// By how much boxes are met as if larger by a ray that starts so far `apart` from an object's centre, with a direction of this
+/// `size`, in each axis. `None` if it starts far away, or if its largest component does not lie between `least` and its reciprocal.
+#[inline(always)]
+pub(crate) fn delta_of<F: Four>(apart: F, size: F, least: f64, object: &Extent) -> Option<f32> {
+    let [(far, delta), (near, least_delta)] = object.bounds_of_rays();
+    let here = apart.le(F::splat(far)) & size.le(F::splat(1.0 / least));
+    if !(here & 7 == 7 && F::splat(least).le(size) & 7 != 0) {
+        return None;
+    }
+    Some(if apart.le(F::splat(near)) & 7 == 7 { least_delta } else { delta })
+}
+
 impl<L: Lanes> Entered<L> {
     /// `None` as of [`LocalRay::enter`], and for an interval that is none.
     #[inline(always)]
@@ -71,14 +83,9 @@ impl<L: Lanes> Entered<L> {
             (four(transform.point_to_object(ray.origin)), four(transform.vector_to_object(ray.direction)))
         };
         let (center, _, half) = object.parts();
-        let [(far, delta), (near, least_delta)] = object.bounds_of_rays();
         let center: L::Four = L::Four::new(center[0], center[1], center[2], center[2]);
         let (apart, size) = (origin.sub(center).abs(), direction.abs());
-        let here = apart.le(L::Four::splat(far)) & size.le(L::Four::splat(1.0 / LEAST));
-        if !(here & 7 == 7 && L::Four::splat(LEAST).le(size) & 7 != 0) {
-            return Self::rare(ray, transform, object);
-        }
-        let delta = if apart.le(L::Four::splat(near)) & 7 == 7 { least_delta } else { delta };
+        let Some(delta) = delta_of(apart, size, LEAST, object) else { return Self::rare(ray, transform, object) };
         let (scale, unscale) = size.powers();
         let scale32 = L::narrow_four(scale);
         // Of what is smaller than `SMALLEST`, once it is scaled, that reciprocal is taken that `Boxes` would take.

@@ -12,8 +12,8 @@ use core::ops::ControlFlow;
 
 use firsthit_geometry::{Ray, transform::Transform};
 
-pub(crate) use enter::{four, reciprocals};
-pub(crate) use tier::Lean;
+pub(crate) use enter::{delta_of, four, reciprocals};
+pub(crate) use tier::{Lean, careful, tell};
 
 use crate::model::Model;
 use crate::simd::Lanes;

@@ -5,7 +5,7 @@ use firsthit_geometry::triangle::Weights;
 use glam::{DVec3, Vec3};
 
 use super::enter::Entered;
-use crate::kernel::{Fast, Kernel, MOST, Robust, Short, careful_plane, double, short_plane};
+use crate::kernel::{Fast, Kernel, MOST, Plane, Robust, Short, careful_plane, double, short_plane};
 use crate::local::Line;
 use crate::offer::within_triangle;
 use crate::simd::Lanes;
@@ -39,10 +39,19 @@ pub(crate) trait Lean: Kernel {
 /// memory by the caller, always. Not so rare, but cold: registers are for what lies around it.
 #[cold]
 #[inline(never)]
-fn careful<const GRAZED: bool>(triangle: [Vec3; 3], line: Line) -> Seen<DVec3> {
-    let Some(plane) = careful_plane(triangle, line, GRAZED) else { return Seen::Nowhere };
-    let t = if GRAZED { within_triangle(line, plane.t, triangle) } else { Some(plane.t) };
-    t.map_or(Seen::Nowhere, |t| Seen::At(t, (t - line.shift) as f32, plane.normal))
+pub(crate) fn careful<const GRAZED: bool>(triangle: [Vec3; 3], line: Line) -> Option<Plane> {
+    let mut plane = careful_plane(triangle, line, GRAZED)?;
+    if GRAZED {
+        plane.t = within_triangle(line, plane.t, triangle)?;
+    }
+    Some(plane)
+}
+
+/// Whether edge functions tell the weights: as of `Weights::told`, without its division. What is near the ends of what numbers
+/// there are is not for here, nor where one is 0.
+#[inline(always)]
+pub(crate) fn tell([e0, e1, e2]: [f32; 3]) -> bool {
+    (1e-36..=1e36).contains(&(e0 + e1 + e2).abs()) & (e0 != 0.0) & (e1 != 0.0) & (e2 != 0.0)
 }
 
 impl Lean for Fast {
@@ -80,18 +89,16 @@ impl Lean for Robust {
 
     #[inline(always)]
     fn seen<L: Lanes>(ray: &Entered<L>, triangle: &[Vec3; 3], known: [f32; 3], from: f64) -> Seen<DVec3> {
-        // As `Weights::told`, without its division: what is near the ends of what numbers there are is not for here.
-        let [e0, e1, e2] = known;
-        let sum = (e0 + e1 + e2).abs();
-        if !((1e-36..=1e36).contains(&sum) & (e0 != 0.0) & (e1 != 0.0) & (e2 != 0.0)) {
+        if !tell(known) {
             return Seen::Unclear;
         }
-        match short_plane(triangle, &ray.line, MOST, from) {
-            Short::Met(plane) => Seen::At(plane.t, (plane.t - ray.line.shift) as f32, plane.normal),
-            Short::Before => Seen::Nowhere,
+        let plane = match short_plane(triangle, &ray.line, MOST, from) {
+            Short::Met(plane) => Some(plane),
+            Short::Before => None,
             Short::Grazed => careful::<true>(*triangle, ray.line),
             Short::Lost => careful::<false>(*triangle, ray.line),
-        }
+        };
+        plane.map_or(Seen::Nowhere, |p| Seen::At(p.t, (p.t - ray.line.shift) as f32, p.normal))
     }
 
     #[inline(always)]
