@@ -29,6 +29,20 @@ pub enum Geometry {
 }
 
 impl Geometry {
+    /// The parts of a mesh of a file. Vertices that move are where they are when the camera's shutter opens.
+    #[cfg(feature = "import")]
+    #[must_use]
+    pub fn from_desc(mesh: &firsthit_import::scene::MeshDesc) -> Vec<Self> {
+        use firsthit_import::scene::SurfaceDesc;
+        let part = |surface: &SurfaceDesc| match surface {
+            SurfaceDesc::Triangles(m) => {
+                Self::Triangles { positions: m.positions.clone(), triangles: m.triangles.clone() }
+            }
+            SurfaceDesc::Shape(s) => Self::Shape(s.clone()),
+        };
+        mesh.geometries.iter().map(|g| part(&g.surface)).collect()
+    }
+
     /// How many primitives it has.
     pub(crate) fn count(&self) -> u64 {
         match self {
@@ -63,7 +77,7 @@ impl SceneBuilder {
     pub fn from_desc(desc: &firsthit_import::SceneDesc, options: BuildOptions) -> Self {
         let mut builder = Self::new(options);
         desc.meshes.iter().for_each(|mesh| {
-            builder.add_mesh(geometries(mesh));
+            builder.add_mesh(Geometry::from_desc(mesh));
         });
         for i in &desc.instances {
             builder.add_instance(i.mesh, i.transform);
@@ -164,17 +178,4 @@ impl Parts {
         let Self { options, meshes, instances, groups } = self;
         Scene::new(options, &meshes, instances, groups, watch)
     }
-}
-
-/// The parts of a mesh of a file.
-#[cfg(feature = "import")]
-pub(crate) fn geometries(mesh: &firsthit_import::scene::MeshDesc) -> Vec<Geometry> {
-    use firsthit_import::scene::SurfaceDesc;
-    let part = |surface: &SurfaceDesc| match surface {
-        SurfaceDesc::Triangles(m) => {
-            Geometry::Triangles { positions: m.positions.clone(), triangles: m.triangles.clone() }
-        }
-        SurfaceDesc::Shape(s) => Geometry::Shape(s.clone()),
-    };
-    mesh.geometries.iter().map(|g| part(&g.surface)).collect()
 }

@@ -6,11 +6,10 @@ use firsthit_import::SceneDesc;
 use firsthit_import::scene::{MeshDesc, SurfaceDesc};
 use rayon::prelude::*;
 
-use crate::builder::geometries;
 use crate::instance::Placed;
 use crate::model::Model;
 use crate::renew::{self, Followed, Step};
-use crate::{BuildError, Scene};
+use crate::{BuildError, Geometry, Scene};
 
 impl Scene {
     /// The trees of `after`, made of these ones, which are those of `before`: meshes that are the same share theirs,
@@ -52,8 +51,8 @@ impl Scene {
         let known = |i: usize| Some((self.models().get(i)?, before.meshes.get(i)?));
         let model = |(i, mesh): (usize, &MeshDesc)| match known(i) {
             Some((old, was)) if was.same_shape(mesh) => Ok((Arc::clone(old), Step::Kept)),
-            Some((old, was)) if same_triangles(was, mesh) => renew::moved(old, i, &geometries(mesh), options),
-            _ => Ok((Arc::new(Model::new(i, &geometries(mesh), options)?), Step::Built)),
+            Some((old, was)) if same_triangles(was, mesh) => renew::moved(old, i, &Geometry::from_desc(mesh), options),
+            _ => Ok((Arc::new(Model::new(i, &Geometry::from_desc(mesh), options)?), Step::Built)),
         };
         let made: Vec<(Arc<Model>, Step)> =
             after.meshes.par_iter().enumerate().map(model).collect::<Result<_, BuildError>>()?;

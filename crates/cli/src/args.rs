@@ -380,8 +380,8 @@ pub(crate) struct AnimationArgs {
     #[arg(long, requires = "frames")]
     pub(crate) skip_existing: bool,
 
-    /// For how long the shutter is open from that moment on, as 20ms: what moves as a whole meanwhile is blurred (see
-    /// --motion-steps); meshes that change their shape, cameras and lights are not
+    /// For how long the shutter is open from that moment on, as 20ms: what moves meanwhile, vertices and cameras too, is
+    /// blurred (see --motion-steps); lights are not
     #[arg(long, value_name = "TIME", value_parser = values::time)]
     pub(crate) shutter: Option<Duration>,
 }

@@ -22,7 +22,7 @@ impl SceneDesc {
         for (i, instance) in self.instances.iter_mut().enumerate() {
             let Err(fault) = Transform::new(instance.transform) else { continue };
             let InstanceDesc { name, mesh, transform, moves_to } = instance;
-            // Its vertices are where they were when the shutter opened.
+            // It stays where it was when the shutter opened.
             *moves_to = None;
             let shared = users[*mesh] > 1;
             users[*mesh] -= 1;
@@ -81,8 +81,9 @@ impl MeshDesc {
 ///
 /// Normals go by the matrix of cofactors, which serves singular matrices as well; where nothing of one is left, all
 /// are dropped (flat). Where the transform mirrors, triangles are turned round, so that their outside stays outside.
-/// `false` if a position is no longer finite.
+/// Where the vertices would have moved to is forgotten. `false` if a position is no longer finite.
 pub(crate) fn deform(mesh: &mut TriangleMesh, transform: impl Fn(usize) -> DAffine3, origin: DVec3) -> bool {
+    mesh.moves_to = None;
     let mut mirrored = 0_usize;
     let mut flat = false;
     for v in 0..mesh.positions.len() {

@@ -169,7 +169,7 @@ pub fn open_with<T: Send>(
             let play = Play { time: play.time + play.shutter, shutter: 0.0, ..play.clone() };
             let options = Options { play: Some(play), decode: Decode::Nothing, ..options.clone() };
             let later = read_as(format, &file, &options, &Inclusion::default(), &mut |_, _| Ok(()))?;
-            if let Some(message) = scene.move_to(&later.scene) {
+            if let Some(message) = scene.move_to(later.scene) {
                 report.warn(&file, "", message);
             }
         }

@@ -178,13 +178,6 @@ impl LightDesc {
 impl CameraDesc {
     /// A camera keeps its right angles whatever it stands on: it looks along the moved axis, as upright as before.
     fn moved(self, by: DAffine3) -> Self {
-        let moved = by * self.transform;
-        let back = moved.matrix3.z_axis.try_normalize();
-        let right = moved.matrix3.y_axis.cross(moved.matrix3.z_axis).try_normalize();
-        let matrix3 = match (back, right) {
-            (Some(back), Some(right)) => DMat3::from_cols(right, back.cross(right), back),
-            _ => self.transform.matrix3,
-        };
         let projection = match self.projection {
             Projection::Orthographic { half_height, aspect } => {
                 Projection::Orthographic { half_height: half_height * mean_scale(by), aspect }
@@ -195,8 +188,20 @@ impl CameraDesc {
             aperture: lens.aperture * mean_scale(by),
             focus_distance: lens.focus_distance.map(|d| d * mean_scale(by)),
         });
-        Self { name: self.name, transform: DAffine3 { matrix3, translation: moved.translation }, projection, lens }
+        let (transform, moves_to) = (upright(by, self.transform), self.moves_to.map(|to| upright(by, to)));
+        Self { name: self.name, transform, projection, lens, moves_to }
     }
+}
+
+fn upright(by: DAffine3, camera: DAffine3) -> DAffine3 {
+    let moved = by * camera;
+    let back = moved.matrix3.z_axis.try_normalize();
+    let right = moved.matrix3.y_axis.cross(moved.matrix3.z_axis).try_normalize();
+    let matrix3 = match (back, right) {
+        (Some(back), Some(right)) => DMat3::from_cols(right, back.cross(right), back),
+        _ => camera.matrix3,
+    };
+    DAffine3 { matrix3, translation: moved.translation }
 }
 
 fn mean_scale(by: DAffine3) -> f64 {

@@ -14,8 +14,8 @@ pub struct Play {
     pub animation: AnimationChoice,
     /// Seconds from its beginning. Before its first key and after its last all is as at that key.
     pub time: f64,
-    /// For how many seconds the camera's shutter is open from then on: what moves as a whole meanwhile gets
-    /// [`moves_to`](crate::scene::InstanceDesc::moves_to).
+    /// For how many seconds the camera's shutter is open from then on: what moves meanwhile gets
+    /// [`moves_to`](crate::scene::InstanceDesc::moves_to), as do vertices and cameras.
     pub shutter: f64,
 }
 

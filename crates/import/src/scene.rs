@@ -101,6 +101,20 @@ pub struct TriangleMesh {
     pub uvs: Vec<Vec<glam::Vec2>>,
     /// Linear vertex colours with alpha; empty: white.
     pub colors: Vec<glam::Vec4>,
+    /// Where its vertices are when the camera's shutter closes, if they move by themselves: until then they go there
+    /// evenly. Texture coordinates and colours stay.
+    pub moves_to: Option<Box<Vertices>>,
+}
+
+/// What of a mesh's vertices moves. Arrays are as long as those of the mesh.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Vertices {
+    /// Their positions.
+    pub positions: Vec<Vec3>,
+    /// Their unit normals.
+    pub normals: Vec<Vec3>,
+    /// Their unit tangents with handedness.
+    pub tangents: Vec<glam::Vec4>,
 }
 
 /// A mesh in the world.
@@ -359,6 +373,8 @@ pub struct CameraDesc {
     pub projection: Projection,
     /// Its lens; `None`: a pinhole, before which everything is sharp.
     pub lens: Option<LensDesc>,
+    /// Where it is when its shutter closes, if it moves: `transform` is where it is when the shutter opens.
+    pub moves_to: Option<DAffine3>,
 }
 
 /// A thin lens.
@@ -424,7 +440,12 @@ impl TriangleMesh {
             + size_of_val(self.normals.as_slice())
             + size_of_val(self.tangents.as_slice())
             + size_of_val(self.colors.as_slice());
-        (uvs + rest) as u64
+        let moved = self.moves_to.as_ref().map_or(0, |to| {
+            size_of_val(to.positions.as_slice())
+                + size_of_val(to.normals.as_slice())
+                + size_of_val(to.tangents.as_slice())
+        });
+        (uvs + rest + moved) as u64
     }
 }
 

@@ -541,6 +541,7 @@ mod tests {
             transform: DAffine3::from_mat3_translation(turn * 3.0, DVec3::new(1.0, 2.0, 3.0)),
             projection: Projection::Perspective { vertical_fov: 0.7, aspect: None },
             lens: None,
+            moves_to: None,
         };
         let camera = Camera::from_desc(&desc, &Aabb::empty()).unwrap();
         close(camera.forward(), turn * DVec3::NEG_Z);
@@ -556,7 +557,8 @@ mod tests {
     #[test]
     fn a_narrow_picture_shows_all_that_a_files_camera_shows() {
         let projection = Projection::Perspective { vertical_fov: 0.8, aspect: Some(2.0) };
-        let desc = CameraDesc { name: String::new(), transform: DAffine3::IDENTITY, projection, lens: None };
+        let desc =
+            CameraDesc { name: String::new(), transform: DAffine3::IDENTITY, projection, lens: None, moves_to: None };
         let camera = Camera::from_desc(&desc, &Aabb::empty()).unwrap();
         let half_width = |w, h| {
             let d = camera.on_film(w, h).ray([f64::from(w), 0.5 * f64::from(h)]).direction;
@@ -646,6 +648,7 @@ mod tests {
             transform: DAffine3::ZERO,
             projection: Projection::Orthographic { half_height: 1.0, aspect: None },
             lens: None,
+            moves_to: None,
         };
         assert_eq!(Camera::from_desc(&desc, &Aabb::empty()), Err(CameraError::Degenerate));
     }

@@ -100,7 +100,7 @@ impl Forward {
         options: &RenderOptions,
         sample: u32,
         limits: Limits,
-        (camera, cone): (&FilmCamera, Cone),
+        (cameras, cone): (&[FilmCamera], Cone),
         filter: &Filter,
         clip: &ClipRegion<f64>,
         goes_on: &dyn Fn() -> bool,
@@ -133,7 +133,7 @@ impl Forward {
                     let (k, moment) = stage.moment(time);
                     let Some(emitters) = &self.emitters[k] else { continue };
                     tracer.stage = moment;
-                    let scene = Scene { emitters, camera, cone, reach: self.reach, limits };
+                    let scene = Scene { emitters, camera: &cameras[k], cone, reach: self.reach, limits };
                     light += tracer.light_path(&scene, sampler, &mut found);
                 }
                 let (rays, timing) = (tracer.counts, tracer.timing);

@@ -1,16 +1,63 @@
 //! Things that move while the shutter is open.
 //!
 //! The time that the shutter is open is cut into steps, and each sample sees the scene as it is in the middle of one of
-//! them: a stage of its own that shares all meshes, trees over triangles and materials with the others. So a ray needs no
-//! time, and every query and every integrator sees motion. What moves by more pixels than there are steps shows as that
+//! them: a stage of its own that shares materials, and all meshes and trees over triangles but those of meshes whose
+//! vertices move, with the others. So a ray needs no time, and every query and every integrator sees motion. What moves by more pixels than there are steps shows as that
 //! many faint pictures of itself.
 
 use firsthit_import::SceneDesc;
-use glam::DAffine3;
+use firsthit_import::scene::{CameraDesc, GeometryDesc, InstanceDesc, MeshDesc, SurfaceDesc, TriangleMesh};
+use glam::{DAffine3, Vec3, Vec4};
+use rayon::prelude::*;
 
-/// Whether anything moves; how many instances.
+/// How many instances move, as a whole or by their vertices.
 pub(crate) fn count(scene: &SceneDesc) -> usize {
-    scene.instances.iter().filter(|i| i.moves_to.is_some_and(|to| to != i.transform)).count()
+    let bends: Vec<bool> = scene.meshes.iter().map(bends).collect();
+    let moves = |i: &&InstanceDesc| i.moves_to.is_some_and(|to| to != i.transform) || bends[i.mesh];
+    scene.instances.iter().filter(moves).count()
+}
+
+/// Whether some of its vertices move.
+fn bends(mesh: &MeshDesc) -> bool {
+    mesh.geometries.iter().any(|g| matches!(&g.surface, SurfaceDesc::Triangles(m) if m.moves_to.is_some()))
+}
+
+/// The meshes whose vertices move, by their indices, as they are at a time from 0 to 1.
+pub(crate) fn bent(scene: &SceneDesc, time: f64) -> Vec<(usize, MeshDesc)> {
+    let moving = scene.meshes.par_iter().enumerate().filter(|(_, mesh)| bends(mesh));
+    moving.map(|(i, mesh)| (i, bend(mesh, time as f32))).collect()
+}
+
+fn bend(mesh: &MeshDesc, time: f32) -> MeshDesc {
+    let part = |g: &GeometryDesc| {
+        let surface = match &g.surface {
+            SurfaceDesc::Triangles(mesh) => SurfaceDesc::Triangles(bend_triangles(mesh, time)),
+            shape @ SurfaceDesc::Shape(_) => shape.clone(),
+        };
+        GeometryDesc { name: g.name.clone(), surface, material: g.material }
+    };
+    MeshDesc { name: mesh.name.clone(), geometries: mesh.geometries.iter().map(part).collect() }
+}
+
+/// Positions go straight and evenly, normals and tangents turn with them.
+fn bend_triangles(mesh: &TriangleMesh, time: f32) -> TriangleMesh {
+    let Some(to) = &mesh.moves_to else { return mesh.clone() };
+    let turned = |a: Vec3, b: Vec3| a.lerp(b, time).try_normalize().unwrap_or(a);
+    let tangent = |(a, b): (&Vec4, &Vec4)| turned(a.truncate(), b.truncate()).extend(a.w);
+    TriangleMesh {
+        positions: mesh.positions.iter().zip(&to.positions).map(|(a, b)| a.lerp(*b, time)).collect(),
+        triangles: mesh.triangles.clone(),
+        normals: mesh.normals.iter().zip(&to.normals).map(|(a, b)| turned(*a, *b)).collect(),
+        tangents: mesh.tangents.iter().zip(&to.tangents).map(tangent).collect(),
+        uvs: mesh.uvs.clone(),
+        colors: mesh.colors.clone(),
+        moves_to: None,
+    }
+}
+
+/// A camera's place at a time from 0 to 1.
+pub(crate) fn camera(camera: &CameraDesc, time: f64) -> Option<CameraDesc> {
+    camera.moves_to.map(|to| CameraDesc { transform: between(camera.transform, to, time), ..camera.clone() })
 }
 
 /// Where all instances are at a time from 0, when the shutter opens, to 1, when it closes.

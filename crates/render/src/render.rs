@@ -372,6 +372,8 @@ struct Job<'a> {
     options: &'a RenderOptions,
     aovs: Vec<Aov>,
     camera: FilmCamera,
+    /// The same at each moment that is looked at.
+    cameras: Vec<FilmCamera>,
     cone: Cone,
     filter: Filter,
     clip: ClipRegion<f64>,
@@ -387,6 +389,7 @@ struct Job<'a> {
 impl<'a> Job<'a> {
     fn new(stage: &'a Stage, options: &'a RenderOptions, film: &Film) -> Self {
         let camera = stage.camera().on_film(options.width, options.height);
+        let cameras = stage.moments().iter().map(|m| m.camera.on_film(options.width, options.height)).collect();
         let cone = camera.cone();
         let simulated = stage.plan().simulated();
         let extent = stage.accel.bounds().extent();
@@ -430,6 +433,7 @@ impl<'a> Job<'a> {
             options,
             aovs,
             camera,
+            cameras,
             cone: Cone { width: cone.width * FOOTPRINT, spread: cone.spread * FOOTPRINT },
             filter,
             empty,
@@ -465,7 +469,7 @@ impl<'a> Job<'a> {
                 }
                 // Light paths are followed for one sample of all pixels at a time.
                 last = first + 1;
-                let of_camera = (&self.camera, self.cone);
+                let of_camera = (self.cameras.as_slice(), self.cone);
                 let limits = self.limits();
                 // Until the light paths are all followed, nothing of this sample is in the film.
                 let sums = Sums { film, rest };
@@ -647,12 +651,16 @@ impl<'a> Job<'a> {
     ) -> (Shot, Ray<f64>) {
         let [dx, dy] = self.filter.offset(tracer.draw2(&sampler, Dimension::Pixel));
         let at = [f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy];
-        let ray = if K::RARE && self.camera.has_lens() {
+        let mut camera = &self.camera;
+        if K::RARE && self.stage.moves() {
+            camera = &self.cameras[self.stage.moment(tracer.draw1(&sampler, Dimension::Time)).0];
+        }
+        let ray = if K::RARE && camera.has_lens() {
             tally::sample(EffectSet::DEPTH_OF_FIELD);
             let on_lens = warp::disk(tracer.draw2(&sampler, Dimension::Lens));
-            self.camera.ray_through_lens(at, on_lens.as_dvec2().to_array())
+            camera.ray_through_lens(at, on_lens.as_dvec2().to_array())
         } else {
-            self.camera.ray(at)
+            camera.ray(at)
         };
         let screen = [(at[0] / f64::from(self.options.width)) as f32, (at[1] / f64::from(self.options.height)) as f32];
         (Shot { pixel: (x, y), sampler, screen, timed, begun: None }, ray)

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use firsthit_accel::{Hit, HitId, SurfacePoint};
+use firsthit_accel::{Geometry, Hit, HitId, SurfacePoint};
 use firsthit_import::SceneDesc;
 use firsthit_import::scene::MaterialDesc;
 use glam::{DAffine3, DVec3, Vec3};
@@ -180,7 +180,9 @@ impl Stage {
     ) -> Result<Self, StageError> {
         let reference = scene.settings.reference_conventions;
         let mut explain = Vec::new();
-        let mut camera = choose_camera(&scene, &accel, options, &mut explain)?;
+        let own = file_camera(&scene, options)?;
+        let mut camera = choose_camera(&scene, &accel, options, own, &mut explain)?;
+        let moving_camera = own.map(|i| &scene.cameras[i]).filter(|c| c.moves_to.is_some()).cloned();
         let Setting { environment, background, words, dim, studio } = setting::choose(&scene, options)?;
         explain.extend(words);
 
@@ -200,6 +202,9 @@ impl Stage {
             0 => {}
             1 => plan.call(EffectSet::MOTION, "1 object that moves"),
             n => plan.call(EffectSet::MOTION, format!("{n} objects that move")),
+        }
+        if moving_camera.is_some() {
+            plan.call(EffectSet::MOTION, "a camera that moves");
         }
         if camera.has_lens() {
             plan.call(EffectSet::DEPTH_OF_FIELD, "the camera's lens");
@@ -321,10 +326,18 @@ impl Stage {
                 }
             }
         }
-        if effects.contains(EffectSet::MOTION) && motion::count(stage.scene()) > 0 {
+        if effects.contains(EffectSet::MOTION) && (moving_camera.is_some() || motion::count(stage.scene()) > 0) {
             let steps = options.motion_steps.max(1);
-            let moments = (0..steps).map(|k| stage.at((f64::from(k) + 0.5) / f64::from(steps), studio));
-            stage.moments = moments.collect::<Result<_, _>>()?;
+            let moment = |k| {
+                let time = (f64::from(k) + 0.5) / f64::from(steps);
+                let mut moment = stage.at(time, studio)?;
+                if let Some(camera) = moving_camera.as_ref().and_then(|camera| motion::camera(camera, time)) {
+                    let camera = as_asked(Camera::from_desc(&camera, &stage.accel.bounds())?, options)?;
+                    moment.camera = if stage.camera.has_lens() { camera } else { camera.without_lens() };
+                }
+                Ok::<_, StageError>(moment)
+            };
+            stage.moments = (0..steps).map(moment).collect::<Result<_, _>>()?;
         }
         Ok(stage)
     }
@@ -332,8 +345,12 @@ impl Stage {
     /// The same at another time, from 0, when the shutter opens, to 1, when it closes.
     fn at(&self, time: f64, studio: bool) -> Result<Self, StageError> {
         let places = motion::transforms(self.scene(), time);
-        let accel = self.accel.with_transforms(&places).map_err(|e| StageError::Motion(e.to_string()))?;
-        let world = World::new(Arc::clone(self.scene()), places);
+        let bent = motion::bent(self.scene(), time);
+        let mut update = self.accel.update();
+        places.iter().enumerate().for_each(|(i, place)| _ = update.set_transform(i, *place));
+        bent.iter().for_each(|(i, mesh)| _ = update.move_vertices(*i, Geometry::from_desc(mesh)));
+        let (accel, _) = update.finish().map_err(|e| StageError::Motion(e.to_string()))?;
+        let world = World::bent(Arc::clone(self.scene()), places, bent);
         let area = glowing(&world, &self.materials, &self.dark, self.plan.simulated());
         let followed = is_followed(self.plan.simulated());
         let choice = LightChoice::new(&self.lights.punctual, &area, self.lights.environment.as_ref(), studio, followed);
@@ -454,26 +471,30 @@ fn explain_environment(dim: bool) -> String {
     if dim { "dim studio".into() } else { "surroundings".into() }
 }
 
+/// Which of the file's cameras is asked for, if any.
+fn file_camera(scene: &SceneDesc, options: &StageOptions) -> Result<Option<usize>, StageError> {
+    match &options.camera {
+        CameraChoice::Framed(_) => Ok(None),
+        CameraChoice::Auto => Ok(scene.settings.camera.filter(|i| *i < scene.cameras.len())),
+        CameraChoice::Named(wanted) => {
+            let by_name = scene.cameras.iter().position(|c| c.name == *wanted);
+            let by_index = || wanted.parse().ok().filter(|i| *i < scene.cameras.len());
+            by_name.or_else(by_index).map(Some).ok_or_else(|| {
+                let cameras = scene.cameras.iter().map(|c| c.name.clone()).collect();
+                StageError::NoSuchCamera { wanted: wanted.clone(), cameras }
+            })
+        }
+    }
+}
+
 fn choose_camera(
     scene: &SceneDesc,
     accel: &firsthit_accel::Scene,
     options: &StageOptions,
+    own: Option<usize>,
     explain: &mut Vec<String>,
 ) -> Result<Camera, StageError> {
-    let chosen = match &options.camera {
-        CameraChoice::Framed(_) => None,
-        CameraChoice::Auto => scene.settings.camera.filter(|i| *i < scene.cameras.len()),
-        CameraChoice::Named(wanted) => {
-            let by_name = scene.cameras.iter().position(|c| c.name == *wanted);
-            let by_index = || wanted.parse().ok().filter(|i| *i < scene.cameras.len());
-            let Some(i) = by_name.or_else(by_index) else {
-                let cameras = scene.cameras.iter().map(|c| c.name.clone()).collect();
-                return Err(StageError::NoSuchCamera { wanted: wanted.clone(), cameras });
-            };
-            Some(i)
-        }
-    };
-    let camera = match chosen {
+    let camera = match own {
         Some(i) => {
             explain.push(format!("camera: '{}' of the file", scene.cameras[i].name));
             Camera::from_desc(&scene.cameras[i], &accel.bounds())?
@@ -487,11 +508,15 @@ fn choose_camera(
             framing.camera
         }
     };
-    if options.camera_changes == crate::CameraChanges::default() {
-        return Ok(camera);
+    if options.camera_changes != crate::CameraChanges::default() {
+        explain.push("camera: changed as asked".into());
     }
-    explain.push("camera: changed as asked".into());
-    Ok(camera.changed(&options.camera_changes)?)
+    as_asked(camera, options)
+}
+
+fn as_asked(camera: Camera, options: &StageOptions) -> Result<Camera, StageError> {
+    let asked = options.camera_changes != crate::CameraChanges::default();
+    Ok(if asked { camera.changed(&options.camera_changes)? } else { camera })
 }
 
 /// Kept beside [`Background`] so that a picture's background is decided in one place.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use firsthit_accel::{Hit, HitId, SurfacePoint};
 use firsthit_geometry::{Primitive, Ray};
 use firsthit_import::SceneDesc;
-use firsthit_import::scene::{SurfaceDesc, TriangleMesh};
+use firsthit_import::scene::{MeshDesc, SurfaceDesc, TriangleMesh};
 use glam::{DAffine3, DMat3, DVec3, Mat3, Vec2, Vec3, Vec4};
 
 use crate::integrator::clock::Clock;
@@ -18,13 +18,18 @@ use crate::{EffectSet, tally};
 #[derive(Clone, Debug)]
 pub(crate) struct World {
     pub(crate) scene: Arc<SceneDesc>,
+    /// Meshes whose vertices are elsewhere at this moment: they count on from those of the scene.
+    bent: Vec<MeshDesc>,
     pub(crate) instances: Vec<Instance>,
 }
 
 /// A placed mesh.
 #[derive(Clone, Debug)]
 pub(crate) struct Instance {
+    /// Index of its mesh in the scene.
     pub(crate) mesh: usize,
+    /// See [`World::mesh`].
+    shape: usize,
     pub(crate) transform: DAffine3,
     /// From world directions to the mesh's.
     inverse: DMat3,
@@ -39,6 +44,17 @@ pub(crate) struct Instance {
 impl World {
     /// The scene with its instances at these places.
     pub(crate) fn new(scene: Arc<SceneDesc>, transforms: impl IntoIterator<Item = DAffine3>) -> Self {
+        Self::bent(scene, transforms, Vec::new())
+    }
+
+    /// The same with other vertices of some of its meshes, which are told by their indices.
+    pub(crate) fn bent(
+        scene: Arc<SceneDesc>,
+        transforms: impl IntoIterator<Item = DAffine3>,
+        bent: Vec<(usize, MeshDesc)>,
+    ) -> Self {
+        let mut shapes: Vec<usize> = (0..scene.meshes.len()).collect();
+        bent.iter().enumerate().for_each(|(k, (mesh, _))| shapes[*mesh] = scene.meshes.len() + k);
         let instances = scene
             .instances
             .iter()
@@ -47,6 +63,7 @@ impl World {
                 let inverse = transform.matrix3.inverse();
                 Instance {
                     mesh: i.mesh,
+                    shape: shapes[i.mesh],
                     transform,
                     inverse,
                     vectors: transform.matrix3.as_mat3(),
@@ -55,7 +72,15 @@ impl World {
                 }
             })
             .collect();
-        Self { scene, instances }
+        Self { scene, bent: bent.into_iter().map(|(_, mesh)| mesh).collect(), instances }
+    }
+
+    /// The mesh of an instance as it is at this moment.
+    #[inline]
+    pub(crate) fn mesh(&self, instance: &Instance) -> &MeshDesc {
+        let meshes = &self.scene.meshes;
+        // Most are those of the scene; what is looked for elsewhere is past their end.
+        meshes.get(instance.shape).unwrap_or_else(|| &self.bent[instance.shape - meshes.len()])
     }
 
     /// Index of the material of a geometry; `materials` (one past the last) is the default material.
@@ -69,7 +94,7 @@ impl World {
     #[inline]
     fn part(&self, id: HitId, u: f32, v: f32) -> Part<'_> {
         let instance = &self.instances[id.instance as usize];
-        match &self.scene.meshes[instance.mesh].geometries[id.geometry as usize].surface {
+        match &self.mesh(instance).geometries[id.geometry as usize].surface {
             SurfaceDesc::Triangles(mesh) => {
                 let corners = mesh.triangles[id.primitive as usize].map(|i| i as usize);
                 Part::Triangle { mesh, corners, weights: [1.0 - u - v, u, v] }
@@ -108,7 +133,7 @@ impl World {
     /// Whether a ray in this direction meets the outer side of a triangle or not; shapes always count as outside.
     pub(crate) fn faces(&self, id: HitId, direction: DVec3) -> bool {
         let instance = &self.instances[id.instance as usize];
-        match &self.scene.meshes[instance.mesh].geometries[id.geometry as usize].surface {
+        match &self.mesh(instance).geometries[id.geometry as usize].surface {
             SurfaceDesc::Triangles(mesh) => {
                 let [a, b, c] = mesh.triangles[id.primitive as usize].map(|i| mesh.positions[i as usize].as_dvec3());
                 (b - a).cross(c - a).dot(instance.inverse * direction) < 0.0
@@ -517,7 +542,7 @@ impl World {
     /// The crossing at a candidate hit of a filter, whose normal is not filled in.
     pub(crate) fn crossing(&self, hit: &Hit, ray: &Ray<f64>) -> Crossing {
         let instance = &self.instances[hit.id.instance as usize];
-        let geometry = &self.scene.meshes[instance.mesh].geometries[hit.id.geometry as usize];
+        let geometry = &self.mesh(instance).geometries[hit.id.geometry as usize];
         let outward = |n: DVec3| (instance.inverse.transpose() * n).normalize_or_zero();
         match &geometry.surface {
             SurfaceDesc::Triangles(mesh) => {

@@ -1,8 +1,10 @@
 //! Motion blur against how long things cover what is behind them.
 
 use firsthit_import::SceneDesc;
+use firsthit_import::scene::{CameraDesc, Projection, SurfaceDesc, Vertices};
 use firsthit_render::{
-    CameraChanges, EffectOverrides, EffectSet, FilterChoice, IntegratorChoice, RenderOptions, Rendered, StageOptions,
+    CameraChanges, CameraChoice, EffectOverrides, EffectSet, FilterChoice, IntegratorChoice, RenderOptions, Rendered,
+    StageOptions,
 };
 use glam::{DAffine3, DVec2, DVec3};
 
@@ -84,6 +86,67 @@ fn a_moving_ball_covers_each_point_for_its_share_of_the_time() {
         let all = std::f64::consts::PI * radius * radius;
         assert!((sum / all - 1.0).abs() < 2e-3, "{sum} instead of {all}");
         assert_eq!(rendered.effects.simulated() & EffectSet::MOTION, EffectSet::MOTION);
+    }
+}
+
+/// Where a square that grows from nothing to sides of 2 covers what is behind it: from when its border gets there.
+#[test]
+fn a_mesh_that_grows_covers_each_point_from_when_it_gets_there() {
+    let mut scene = scene_of(&[glow(1.0)]);
+    quad(&mut scene, DVec3::new(-1.0, -1.0, 0.0), DVec3::X * 2.0, DVec3::Y * 2.0, 0);
+    let SurfaceDesc::Triangles(mesh) = &mut scene.meshes[0].geometries[0].surface else { unreachable!() };
+    let grown = mesh.positions.clone();
+    mesh.positions.iter_mut().for_each(|p| *p *= 1.0 / 1024.0);
+    mesh.moves_to = Some(Box::new(Vertices { positions: grown, ..Vertices::default() }));
+    for integrator in [IntegratorChoice::Path, IntegratorChoice::Whitted, IntegratorChoice::Light] {
+        let rendered = rendered(&scene, integrator);
+        let at = |i: u32| ((f64::from(i) + 0.5) * (2.0 / f64::from(SIDE)) - 1.0).abs();
+        let (mut worst, mut sum) = (0.0_f64, 0.0);
+        for (i, p) in rendered.film.color().pixels.iter().enumerate() {
+            let (x, y) = (at(i as u32 % SIDE), at(i as u32 / SIDE));
+            worst = worst.max((f64::from(p[0]) - (1.0 - x.max(y))).abs());
+            sum += f64::from(p[0]) / f64::from(SIDE * SIDE);
+        }
+        println!("{integrator:?}: worst pixel off by {worst:.4}, in all {sum:.5}");
+        // A step more or less. In all: the mean of 1 - max(|x|, |y|) is 1/3.
+        assert!(worst < 1.0 / f64::from(STEPS) + 0.01, "{worst}");
+        assert!((sum * 3.0 - 1.0).abs() < 1e-2, "{sum}");
+        assert!(rendered.effects.simulated().contains(EffectSet::MOTION));
+    }
+}
+
+/// Who walks past a ball sees what one sees past whom the ball goes.
+#[test]
+fn a_camera_that_moves_sees_what_moves_the_other_way() {
+    let way = DVec3::new(0.5, 0.25, 0.0);
+    let mut passing = scene_of(&[glow(1.0)]);
+    ball(&mut passing, DVec3::ZERO, 0.3, 0);
+    passing.cameras.push(CameraDesc {
+        name: "here".into(),
+        transform: DAffine3::from_translation(DVec3::Z * 5.0),
+        projection: Projection::Orthographic { half_height: 1.0, aspect: None },
+        lens: None,
+        moves_to: None,
+    });
+    let mut walking = passing.clone();
+    passing.instances[0].moves_to = Some(DAffine3::from_translation(-way));
+    walking.cameras[0].moves_to = Some(DAffine3::from_translation(DVec3::Z * 5.0 + way));
+    for integrator in [IntegratorChoice::Path, IntegratorChoice::Whitted, IntegratorChoice::Light] {
+        let options = RenderOptions { width: SIDE, height: SIDE, integrator, ..small(64) };
+        let camera = CameraChoice::Named("here".into());
+        let setup = StageOptions { camera, aspect: 1.0, ..StageOptions::default() };
+        let pictures = [&passing, &walking].map(|scene| {
+            let rendered = render_scene(scene, &setup, &options);
+            assert!(rendered.effects.simulated().contains(EffectSet::MOTION));
+            rendered.film.color().pixels
+        });
+        let pairs = pictures[0].iter().zip(&pictures[1]);
+        let worst = pairs.map(|(a, b)| (a[0] - b[0]).abs()).fold(0.0, f32::max);
+        let mean = pictures.each_ref().map(|p| p.iter().map(|p| f64::from(p[0])).sum::<f64>());
+        println!("{integrator:?}: worst pixel off by {worst:.4}, in all {mean:?}");
+        // Rays that graze the ball may miss it from elsewhere.
+        assert!(worst < 0.05, "{worst}");
+        assert!(mean[0] > 0.0 && (mean[0] / mean[1] - 1.0).abs() < 2e-3, "{mean:?}");
     }
 }
 

@@ -46,7 +46,9 @@ pub(super) fn camera(
     };
     let name = json.name.clone().or_else(|| camera.name.clone()).unwrap_or_else(|| format!("camera {index}"));
     match (projection, upright(world)) {
-        (Some(projection), Some(transform)) => Ok(Some(CameraDesc { name, transform, projection, lens: None })),
+        (Some(projection), Some(transform)) => {
+            Ok(Some(CameraDesc { name, transform, projection, lens: None, moves_to: None }))
+        }
         _ => {
             report.warn(source.file, place, "its lens or its node's transform makes no picture: left out");
             Ok(None)

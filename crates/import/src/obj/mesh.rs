@@ -244,6 +244,7 @@ impl Attributes<'_> {
                 [] => Vec::new(),
                 colors => vertices.iter().map(|v| colors[corner(v).position as usize]).collect(),
             },
+            moves_to: None,
         }
     }
 }

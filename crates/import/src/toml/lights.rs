@@ -38,7 +38,7 @@ pub(super) fn camera(c: &Camera) -> Result<CameraDesc, String> {
             }),
         }),
     };
-    Ok(CameraDesc { name: c.name.clone().unwrap_or_default(), transform, projection, lens })
+    Ok(CameraDesc { name: c.name.clone().unwrap_or_default(), transform, projection, lens, moves_to: None })
 }
 
 /// Fog as the file describes it.

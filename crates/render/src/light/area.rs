@@ -347,7 +347,7 @@ impl AreaLights {
         let (mut triangles, mut weights, mut first) = (Vec::<GlowingTriangle>::new(), Vec::new(), HashMap::new());
         let mut parts = Vec::new();
         for (i, instance) in world.instances.iter().enumerate() {
-            for (g, geometry) in world.scene.meshes[instance.mesh].geometries.iter().enumerate() {
+            for (g, geometry) in world.mesh(instance).geometries.iter().enumerate() {
                 let id = HitId { instance: i as u32, geometry: g as u32, primitive: 0 };
                 let Some(Glow { both_sides, even, by_view, most }) = glowing(id) else { continue };
                 area.brightest = area.brightest.max(most);

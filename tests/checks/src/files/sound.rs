@@ -41,12 +41,16 @@ pub(super) fn check(imported: &Imported) {
 }
 
 fn triangles(mesh: &TriangleMesh, warned: bool) {
-    let TriangleMesh { positions, triangles, normals, tangents, uvs, colors } = mesh;
+    let TriangleMesh { positions, triangles, normals, tangents, uvs, colors, moves_to } = mesh;
     let count = positions.len();
     assert!(triangles.iter().flatten().all(|&i| (i as usize) < count), "an index is out of range");
     assert!(positions.iter().all(|p| p.is_finite()), "a position is not finite");
     let lengths = [normals.len(), tangents.len(), colors.len()].into_iter().chain(uvs.iter().map(Vec::len));
     lengths.for_each(|n| assert!(n == 0 || n == count, "{n} attributes of {count} vertices"));
+    if let Some(to) = moves_to {
+        assert!(to.positions.len() == count && to.positions.iter().all(|p| p.is_finite()), "{count} vertices move");
+        assert_eq!((to.normals.len(), to.tangents.len()), (normals.len(), tangents.len()));
+    }
     let unit = |length: f32| (length - 1.0).abs() < 1e-3;
     let normal = normals.iter().find(|n| !unit(n.length()));
     assert!(normal.is_none(), "a normal is not of length 1: {normal:?}");
