@@ -89,12 +89,12 @@ pub struct Report {
 }
 
 impl Report {
-    /// Notes a warning.
+    /// Notes a warning. Of what is longer than can be read, the middle is left out: files may have names of any length.
     pub fn warn(&mut self, file: impl AsRef<Path>, place: impl Into<String>, message: impl Into<String>) {
         const KEPT: usize = 100;
         if self.warnings.len() < KEPT {
             let file = file.as_ref().to_owned();
-            self.warnings.push(Warning { file, place: place.into(), message: message.into() });
+            self.warnings.push(Warning { file, place: readable(place.into()), message: readable(message.into()) });
         } else {
             self.more_warnings += 1;
         }
@@ -119,5 +119,29 @@ impl Report {
             }
         }
         self.animations.extend(other.animations);
+    }
+}
+
+/// At most some hundred characters of a text: its two ends.
+fn readable(text: String) -> String {
+    const END: usize = 256;
+    let (head, tail) = (text.char_indices().nth(END), text.char_indices().rev().nth(END - 1));
+    match (head, tail) {
+        (Some((head, _)), Some((tail, _))) if head < tail => format!("{} ... {}", &text[..head], &text[tail..]),
+        _ => text,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_words_lose_their_middle() {
+        let said = |text: &str| readable(text.into());
+        assert_eq!(said("as it is"), "as it is");
+        assert_eq!(said(&"\u{fc}".repeat(512)), "\u{fc}".repeat(512));
+        let long = format!("{}{}{}", "a".repeat(256), "x".repeat(9000), "\u{fc}".repeat(256));
+        assert_eq!(said(&long), format!("{} ... {}", "a".repeat(256), "\u{fc}".repeat(256)));
     }
 }

@@ -6,11 +6,18 @@ use glam::DVec3;
 /// Polygons with more corners are not searched for ears when they are concave: that takes quadratic time at worst.
 const MOST_CORNERS: usize = 4096;
 
+/// Nor are those of more corners than this, once the squares of such numbers add up to [`MOST_SEARCH`] in a file: outlines
+/// that run through the same few points again and again take that long (some 20 s), those of real models do not.
+const MANY_CORNERS: usize = 256;
+const MOST_SEARCH: u64 = 1 << 28;
+
 /// Cuts polygons into triangles; keeps its buffers from one to the next.
 pub(super) struct Triangulator {
     earcut: Earcut<f64>,
     plane: Vec<[f64; 2]>,
     ears: Vec<u32>,
+    /// Squares of the numbers of many corners so far.
+    searched: u64,
 }
 
 /// What became of a polygon.
@@ -20,13 +27,13 @@ pub(super) enum Outcome {
     Good,
     /// It has no area: its triangles have none either.
     Degenerate,
-    /// Too many corners for a concave polygon: the triangles may overlap or reach outside.
+    /// Too many corners for a concave polygon, or for all of them: the triangles may overlap or reach outside.
     TooLarge,
 }
 
 impl Triangulator {
     pub(super) fn new() -> Self {
-        Self { earcut: Earcut::new(), plane: Vec::new(), ears: Vec::new() }
+        Self { earcut: Earcut::new(), plane: Vec::new(), ears: Vec::new(), searched: 0 }
     }
 
     /// Appends the triangles of a polygon, as indices into `points`, with the polygon's own orientation.
@@ -66,7 +73,10 @@ impl Triangulator {
             out.extend(fan(0));
             return Outcome::Good;
         }
-        if points.len() > MOST_CORNERS {
+        if points.len() > MANY_CORNERS {
+            self.searched = self.searched.saturating_add((points.len() as u64).pow(2));
+        }
+        if points.len() > MOST_CORNERS || points.len() > MANY_CORNERS && self.searched > MOST_SEARCH {
             out.extend(fan(0));
             return Outcome::TooLarge;
         }
@@ -159,6 +169,24 @@ mod tests {
             assert_eq!((triangles.len(), outcome), (points.len() - 2, Outcome::Degenerate));
         }
         assert_eq!(cut(&flat(&[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]])).1, Outcome::Degenerate);
+    }
+
+    #[test]
+    fn endless_outlines_are_not_searched_for_ever() {
+        let star = |n: usize| {
+            let corner = |k: usize| {
+                let (r, angle) =
+                    (if k.is_multiple_of(2) { 1.0 } else { 0.5 }, std::f64::consts::TAU * k as f64 / n as f64);
+                [r * f64::cos(angle), r * f64::sin(angle)]
+            };
+            flat(&(0..n).map(corner).collect::<Vec<_>>())
+        };
+        let (mut triangulator, mut out) = (Triangulator::new(), Vec::new());
+        let good = (0..).take_while(|_| triangulator.triangulate(&star(4096), &mut out) == Outcome::Good).count();
+        assert_eq!(good as u64, MOST_SEARCH >> 24);
+        // Smaller ones are cut as before.
+        assert_eq!(triangulator.triangulate(&star(256), &mut out), Outcome::Good);
+        assert_eq!(triangulator.triangulate(&star(258), &mut out), Outcome::TooLarge);
     }
 
     proptest! {
