@@ -43,7 +43,9 @@ pub(crate) fn build(model: &mut Model, file: &Path, unit: &str, report: &mut Rep
     }
     let (too_large, line) = builder.too_large;
     if too_large > 0 {
-        let message = format!("{too_large} concave polygons with too many corners; cut into fans, which may be wrong");
+        let message = format!(
+            "{too_large} concave polygons with too many corners, or the same ones again and again; cut into fans, which may be wrong"
+        );
         report.warn(file, format!("{unit} {line}"), message);
     }
     drop(builder);

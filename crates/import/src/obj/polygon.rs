@@ -6,8 +6,11 @@ use glam::DVec3;
 /// Polygons with more corners are not searched for ears when they are concave: that takes quadratic time at worst.
 const MOST_CORNERS: usize = 4096;
 
-/// Nor are those of more corners than this, once the squares of such numbers add up to [`MOST_SEARCH`] in a file: outlines
-/// that run through the same few points again and again take that long (some 20 s), those of real models do not.
+/// Nor are those of more corners than this that run through the same points again and again, for which it does.
+const SOME_CORNERS: usize = 32;
+
+/// Nor are those of more corners than this, once the squares of such numbers add up to [`MOST_SEARCH`] in a file: whatever
+/// they are, it takes no longer than some 20 s.
 const MANY_CORNERS: usize = 256;
 const MOST_SEARCH: u64 = 1 << 28;
 
@@ -27,7 +30,7 @@ pub(super) enum Outcome {
     Good,
     /// It has no area: its triangles have none either.
     Degenerate,
-    /// Too many corners for a concave polygon, or for all of them: the triangles may overlap or reach outside.
+    /// Too many corners for a concave polygon, or for all of them, or the same ones too often: the triangles may overlap or reach outside.
     TooLarge,
 }
 
@@ -76,7 +79,10 @@ impl Triangulator {
         if points.len() > MANY_CORNERS {
             self.searched = self.searched.saturating_add((points.len() as u64).pow(2));
         }
-        if points.len() > MOST_CORNERS || points.len() > MANY_CORNERS && self.searched > MOST_SEARCH {
+        if points.len() > MOST_CORNERS
+            || points.len() > MANY_CORNERS && self.searched > MOST_SEARCH
+            || points.len() > SOME_CORNERS && distinct(points) < points.len() / 2
+        {
             out.extend(fan(0));
             return Outcome::TooLarge;
         }
@@ -102,6 +108,14 @@ impl Triangulator {
         }));
         Outcome::Good
     }
+}
+
+/// How many different points there are.
+fn distinct(points: &[DVec3]) -> usize {
+    let mut points: Vec<[u64; 3]> = points.iter().map(|p| (*p + 0.0).to_array().map(f64::to_bits)).collect();
+    points.sort_unstable();
+    points.dedup();
+    points.len()
 }
 
 /// Twice the area, along the normal (Newell 1972): exact for plane polygons, the mean for others.
@@ -184,6 +198,9 @@ mod tests {
         let (mut triangulator, mut out) = (Triangulator::new(), Vec::new());
         let good = (0..).take_while(|_| triangulator.triangulate(&star(4096), &mut out) == Outcome::Good).count();
         assert_eq!(good as u64, MOST_SEARCH >> 24);
+        // So are none that run around a square a hundred times, with a turn.
+        let again: Vec<_> = (0..400).map(|k| [f64::from(k / 2 % 2), f64::from((k + 1) / 2 % 2)]).collect();
+        assert_eq!(cut(&flat(&[again, vec![[0.4, 0.3], [2.0, 0.1]]].concat())).1, Outcome::TooLarge);
         // Smaller ones are cut as before.
         assert_eq!(triangulator.triangulate(&star(256), &mut out), Outcome::Good);
         assert_eq!(triangulator.triangulate(&star(258), &mut out), Outcome::TooLarge);
