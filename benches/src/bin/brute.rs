@@ -1,6 +1,6 @@
 //! Every answer against all triangles, decided exactly: how many are wrong.
 //!
-//! `cargo run --release -p firsthit-benches --bin brute -- [--random N] [--aimed M] [--only rays|points] [--json FILE] MODEL...`
+//! `cargo run --release -p firsthit-benches --bin brute -- [--random N] [--aimed M] [--only rays|points|regions] [--json FILE] MODEL...`
 
 use std::io::{IsTerminal, Write as _, stderr};
 use std::path::PathBuf;
@@ -28,7 +28,7 @@ struct Args {
     /// Rays, and points, at corners, edges and the like
     #[arg(long, value_name = "M", default_value_t = 20_000)]
     aimed: usize,
-    /// Ask rays alone, or points alone
+    /// Ask rays alone, points alone, or regions alone
     #[arg(long, value_name = "WHAT")]
     only: Option<Only>,
     /// Powers of two by which the model is scaled, comma-separated
@@ -52,6 +52,7 @@ struct Args {
 enum Only {
     Rays,
     Points,
+    Regions,
 }
 
 fn main() -> ExitCode {
@@ -75,8 +76,9 @@ fn all(args: Args) -> Result<u64, String> {
     let plan = Plan {
         random: args.random,
         aimed: args.aimed,
-        rays: args.only != Some(Only::Points),
-        points: args.only != Some(Only::Rays),
+        rays: args.only.is_none_or(|only| only == Only::Rays),
+        points: args.only.is_none_or(|only| only == Only::Points),
+        regions: args.only.is_none_or(|only| only == Only::Regions),
         exponents: args.exponents,
         scaled_every: args.scaled_every,
         seed: args.seed,

@@ -6,7 +6,7 @@ use firsthit_geometry::distance::{Feature, closest_on_triangle};
 use glam::DVec3;
 
 use super::judge_rays::all_hits;
-use super::precise::to_triangle;
+use super::precise::{Number as _, Pair, to_triangle};
 use super::tally::{Source, Tally};
 
 /// Of the nearest triangles so many are asked for, at most.
@@ -211,7 +211,7 @@ impl Judge<'_> {
         tally: &mut Tally,
     ) -> f64 {
         // Of several that are as near in f64, another may be the nearest.
-        let distance = |n: &Near| to_triangle(self.corners[n.triangle as usize], p).root().rounded();
+        let distance = |n: &Near| to_triangle::<Pair>(self.corners[n.triangle as usize], p).root().rounded();
         let least = near.iter().map(distance).fold(f64::INFINITY, f64::min);
         let seen = near.iter().flat_map(|n| self.corners[n.triangle as usize]);
         let unit = seen.fold(least, |m, c| m.max((c - p).abs().max_element())) * f64::EPSILON;

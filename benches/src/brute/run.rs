@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::Instant;
 
-use firsthit_accel::{Scene, SignMethod};
+use firsthit_accel::{Scene, SignMethod, SphereHit};
 use firsthit_geometry::Ray;
 use firsthit_measure::random::Rng;
 use glam::DVec3;
@@ -12,8 +12,10 @@ use super::angles::Angles;
 use super::closed::Edges;
 use super::judge_points::{self, Asked, FEW, Inside, Judge, METHODS};
 use super::judge_rays::{self, all_hits};
+use super::judge_regions;
 use super::points::Points;
 use super::rays::Rays;
+use super::regions::{KINDS, Moving, Placed, Regions};
 use super::sieve::Sieve;
 use super::tally::{Source, Tally};
 use super::{UNSIEVED, corners, scene};
@@ -30,6 +32,8 @@ pub struct Plan {
     pub rays: bool,
     /// Whether points are.
     pub points: bool,
+    /// Whether regions and spheres that move are.
+    pub regions: bool,
     /// Powers of two by which the mesh is scaled.
     pub exponents: Vec<i32>,
     /// Of so many chunks of queries one is asked at these scales too.
@@ -101,6 +105,9 @@ pub fn run(model: &Model, plan: &Plan, watch: &Watch<'_>) -> Result<Outcome, Str
         job.points(&whole, &scaled, &methods, &mut judge);
     }
     let (worst_distance, worst_winding) = (judge.worst_distance, judge.worst_winding);
+    if plan.regions {
+        job.regions(&whole, &scaled);
+    }
     let interrupted = watch.stop.load(Relaxed);
     let seconds = start.elapsed().as_secs_f64();
     Ok(Outcome { tally, edges, self_intersections, worst_distance, worst_winding, seconds, interrupted })
@@ -197,6 +204,61 @@ impl Job<'_> {
     }
 }
 
+/// Regions of each kind, and spheres that move.
+impl Job<'_> {
+    fn regions(&mut self, whole: &Scene, scaled: &[(i32, Scene)]) {
+        let mut make = Regions::new(self.corners, self.plan.seed ^ 0x4e61);
+        let mut sieved = Vec::new();
+        let all: Vec<u32> = (0..self.corners.len() as u32).collect();
+        let size = self.corners.iter().flatten().fold(0.0, |m: f64, p| m.max(p.length()));
+        for kind in 0..KINDS {
+            self.chunks("regions", |job, source, start, count| {
+                let placed: Vec<Placed> = (0..count).map(|_| make.next(kind, source)).collect();
+                let balls: Vec<_> = placed.iter().map(|p| (p.middle, p.reach)).collect();
+                job.sieve.near_balls(&balls, &mut sieved);
+                let answers: Vec<_> = placed.iter().map(|p| judge_regions::ask(whole, &p.region)).collect();
+                for (i, (placed, near)) in placed.iter().zip(&sieved).enumerate() {
+                    let of = job.of(&all, near, start + i);
+                    judge_regions::judge(&answers[i], placed, job.corners, of, (source, size), job.tally);
+                }
+                for (exponent, scene) in scaled.iter().filter(|_| (start / CHUNK).is_multiple_of(job.plan.scaled_every))
+                {
+                    for (placed, answer) in placed.iter().zip(&answers) {
+                        let there = judge_regions::ask(scene, &placed.region.scaled(*exponent));
+                        let tell = || format!("{answer:?} became {there:?}: {:?}", placed.region);
+                        job.tally.add(placed.region.name(), (source, *exponent), there == *answer, tell);
+                    }
+                }
+            });
+        }
+        self.chunks("spheres that move", |job, source, start, count| {
+            let moving: Vec<Moving> = (0..count).map(|_| make.moving(source)).collect();
+            let balls = moving.iter().map(|m| (m.way.at(0.5), m.radius + 0.5 * m.way.direction.length()));
+            job.sieve.near_balls(&balls.collect::<Vec<_>>(), &mut sieved);
+            let cast = |scene: &Scene, m: &Moving, s: f64| {
+                let way = Ray::new(m.way.origin * s, m.way.direction * s).with_interval(m.way.t_min, m.way.t_max);
+                scene.cast_sphere(&way, m.radius * s)
+            };
+            let answers: Vec<_> = moving.iter().map(|m| cast(whole, m, 1.0)).collect();
+            for (i, (moving, near)) in moving.iter().zip(&mut sieved).enumerate() {
+                // Of the ball about the whole way most is far from it.
+                near.retain(|&t| judge_regions::is_near(moving, job.corners[t as usize]));
+                let of = job.of(&all, near, start + i);
+                judge_regions::judge_cast(answers[i].as_ref(), moving, job.corners, of, (source, size), job.tally);
+            }
+            for (exponent, scene) in scaled.iter().filter(|_| (start / CHUNK).is_multiple_of(job.plan.scaled_every)) {
+                for (moving, answer) in moving.iter().zip(&answers) {
+                    let there = cast(scene, moving, 2f64.powi(*exponent));
+                    let same = |h: &SphereHit| (h.id, h.t);
+                    let right = there.as_ref().map(same) == answer.as_ref().map(same);
+                    let tell = || format!("{answer:?} became {there:?}: {moving:?}");
+                    job.tally.add(judge_regions::CAST, (source, *exponent), right, tell);
+                }
+            }
+        });
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -211,7 +273,8 @@ mod tests {
             }
             let model = Model { name: "ball".into(), mesh: mesh.clone() };
             let (random, aimed, exponents) = (3000, 3000, vec![-40, 20]);
-            let plan = Plan { random, aimed, rays: true, points: true, exponents, scaled_every: 1, seed: 1 };
+            let plan =
+                Plan { random, aimed, rays: true, points: true, regions: true, exponents, scaled_every: 1, seed: 1 };
             let watch = Watch { stop: &AtomicBool::new(false), say: &|_, _, _| {} };
             let outcome = run(&model, &plan, &watch).unwrap();
             assert_eq!(outcome.tally.wrong(), 0, "{:#?}", outcome.tally.failures);

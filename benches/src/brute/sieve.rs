@@ -154,6 +154,26 @@ impl Sieve {
         }
     }
 
+    /// For each ball (middle and radius) the triangles that may meet it, in order.
+    pub fn near_balls(&self, balls: &[(DVec3, f64)], found: &mut Vec<Vec<u32>>) {
+        found.resize(balls.len(), Vec::new());
+        found.iter_mut().for_each(Vec::clear);
+        let seen = |&(p, radius): &(DVec3, f64)| {
+            let from = p - self.middle;
+            let room = 32.0 * U * (from.length() + self.reach);
+            (from.as_vec3().to_array(), (radius * (1.0 + 16.0 * U) + 2.0 * room) as f32)
+        };
+        let seen: Vec<_> = balls.iter().map(seen).collect();
+        for start in (0..self.x.len()).step_by(TILE) {
+            let tile = start..(start + TILE).min(self.x.len());
+            for ((p, most), found) in seen.iter().zip(&mut *found) {
+                self.tile_near_point(tile.clone(), *p, *most, found);
+            }
+        }
+        // What is padded is nowhere, and near an endless ball.
+        found.iter_mut().for_each(|f| f.retain(|&i| (i as usize) < self.count));
+    }
+
     fn tile_least(&self, tile: Range<usize>, p: [f32; 3], least: &mut [f32]) {
         #[cfg(target_arch = "x86_64")]
         if self.wide {
@@ -295,6 +315,12 @@ mod tests {
                 let hit = |i: usize| line.hit(corners[i]).is_some();
                 assert!((0..corners.len()).all(|i| !hit(i) || found.contains(&(i as u32))));
                 assert!(found.len() < corners.len() / 2);
+            }
+            let balls: Vec<_> = (0..200).map(|_| (rng.in_cube() * 2.0 + 5.0, rng.unit())).collect();
+            sieve.near_balls(&balls, &mut found);
+            for ((p, radius), found) in balls.iter().zip(&found) {
+                let distance = |i: usize| closest_on_triangle::<f64>(corners[i], *p).point.distance(*p);
+                assert!((0..corners.len()).all(|i| distance(i) > *radius || found.contains(&(i as u32))));
             }
             let points: Vec<_> = (0..200)
                 .map(|k| corners[rng.below(corners.len())][0] + rng.in_cube() * [0.0, 0.1, 3.0, 300.0][k % 4])
