@@ -6,7 +6,7 @@
 use core::ops::ControlFlow;
 use std::collections::BTreeMap;
 
-use firsthit_geometry::distance::closest_on_triangle;
+use firsthit_geometry::distance::{Feature, closest_on_triangle};
 use firsthit_geometry::overlap::Region;
 use firsthit_geometry::sweep::{ConvexBody, convex_to_triangle, sphere_to_triangle};
 use firsthit_geometry::triangle_pair::{meet, meet_otherwise};
@@ -164,6 +164,26 @@ pub fn nearest_k(scene: &Scene, point: DVec3, count: usize, radius: f64) -> Vec<
     }
     all.sort_by(|(d, a), (e, b)| d.total_cmp(e).then(a.id.cmp(&b.id)));
     all.into_iter().map(|(_, nearest)| nearest).take(count).collect()
+}
+
+/// The point of all triangles that is furthest away, a vertex, each measured in the world in `f64`; of several that are
+/// equally far, that of the smallest id.
+#[must_use]
+pub fn furthest_point(scene: &Scene, point: DVec3) -> Option<ClosestPoint> {
+    let mut best: Option<(f64, ClosestPoint)> = None;
+    for (id, corners) in placed(scene, point).filter(|_| point.is_finite()) {
+        for (vertex, corner) in (0u8..).zip(corners) {
+            let (squared, distance) = (corner.length_squared(), corner.length());
+            let most = best.map_or(f64::NEG_INFINITY, |(most, _)| most);
+            if squared > most {
+                let ([a, b, c], [_, u, v]) = (corners, [0, 1, 2].map(|k| f32::from(u8::from(k == vertex))));
+                let (feature, normal_direction) = (Feature::Vertex(vertex), (b - a).cross(c - a));
+                let point = point + corner;
+                best = Some((squared, ClosestPoint { id, point, distance, u, v, feature, normal_direction }));
+            }
+        }
+    }
+    best.map(|(_, furthest)| furthest)
 }
 
 /// The triangles that meet a region, by id.

@@ -88,6 +88,39 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(150))]
+
+    #[test]
+    fn the_furthest_point_is_that_of_the_slow_twin(
+        (positions, indices) in mesh(), places in prop::collection::vec(place(), 1..12), aims in prop::collection::vec(aim(), 12),
+    ) {
+        let at = |i: u32| places[0].transform_point3(positions[i as usize].as_dvec3());
+        let corners: Vec<[DVec3; 3]> = indices.iter().map(|t| t.map(at)).collect();
+        let size = corners.iter().flatten().fold(0.0f64, |m, p| m.max((*p - corners[0][0]).abs().max_element()));
+        let points: Vec<DVec3> = aims.iter().map(|aim| point(*aim, &corners, size)).collect();
+        for layout in Layout::ALL {
+            let mut builder = SceneBuilder::new(BuildOptions { layout, ..BuildOptions::default() });
+            let mesh = builder.add_mesh(vec![Geometry::Triangles { positions: positions.clone(), triangles: indices.clone() }]);
+            places.iter().for_each(|place| _ = builder.add_instance(mesh, *place));
+            let scene = builder.build().map_err(|e| TestCaseError::fail(e.to_string()))?;
+            let (mut batch, mut parallel) = (vec![None; points.len()], vec![None; points.len()]);
+            scene.furthest_points(&points, &mut batch);
+            scene.par_furthest_points(&points, &mut parallel);
+            for ((p, batch), parallel) in points.iter().zip(batch).zip(parallel) {
+                let expected = reference::furthest_point(&scene, *p);
+                prop_assert_eq!(expected.is_some(), reference::closest_point(&scene, *p).is_some());
+                let got = scene.furthest_point(*p);
+                for got in [&got, &batch, &parallel] {
+                    same(got, &expected)?;
+                }
+                // What is nearest is no farther.
+                prop_assert!(got.is_none_or(|got| scene.distance(*p) <= got.distance));
+            }
+        }
+    }
+}
+
 /// There the outside stays, which the twin does not know.
 fn mirrored(_: &Scene, places: &[DAffine3], got: &ClosestPoint) -> bool {
     places[got.id.instance as usize].matrix3.determinant() < 0.0
@@ -97,6 +130,7 @@ fn mirrored(_: &Scene, places: &[DAffine3], got: &ClosestPoint) -> bool {
 fn a_scene_without_triangles_has_no_nearest_point() {
     let scene = SceneBuilder::default().build().expect("an empty scene");
     assert!(scene.closest_point(DVec3::ZERO).is_none() && scene.nearest_k(DVec3::ZERO, 3, 1.0).is_empty());
+    assert!(scene.furthest_point(DVec3::ZERO).is_none());
     assert_eq!(scene.distance(DVec3::ZERO), f64::INFINITY);
     let mut builder = SceneBuilder::default();
     let flat = Geometry::Triangles { positions: vec![Vec3::ONE], triangles: vec![[0, 0, 0]] };

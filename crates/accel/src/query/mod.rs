@@ -11,6 +11,7 @@ mod crossings;
 mod decision;
 mod direct;
 mod first_hits;
+mod furthest_point;
 mod nearest_k;
 mod tally;
 
