@@ -58,4 +58,14 @@ pub struct BuildOptions {
     pub simd: Level,
     /// Which guards the robust tier has: all, but in measurements.
     pub guards: Guards,
+    /// Bytes of memory that a build may take at most: trees, and what it needs beside while it makes them. A build that
+    /// would need more is refused by [`BuildError::OutOfMemory`](crate::BuildError::OutOfMemory) before it allocates
+    /// anything; where the meshes fit one after the other but not all at once, they are built one after the other. `None`:
+    /// as many as it takes.
+    ///
+    /// What is needed is estimated from the numbers of vertices, primitives and instances alone, and is not too little:
+    /// of large meshes 1.1 to 1.5 times what is taken (`tests/checks/tests/build_memory.rs`). What the caller holds is not
+    /// counted: the geometries, and the scene that is updated. What was taken in the end is told by
+    /// [`Scene::stats`](crate::Scene::stats).
+    pub memory_limit: Option<u64>,
 }

@@ -137,7 +137,7 @@ impl SceneBuilder {
     /// Builds one tree for each mesh and one over the instances, on the threads of the rayon pool it is called from.
     ///
     /// # Errors
-    /// When a vertex, index or transform is unusable: see [`BuildError`].
+    /// When a vertex, index or transform is unusable, or the memory is limited: see [`BuildError`].
     pub fn build(self) -> Result<Scene, BuildError> {
         self.into_parts()?.build(None)
     }

@@ -72,6 +72,14 @@ pub enum BuildError {
         /// How many there are.
         count: usize,
     },
+    /// [`BuildOptions::memory_limit`](crate::BuildOptions::memory_limit) is too little. Nothing was built.
+    #[error("building takes up to {need} bytes of memory, and {limit} are allowed")]
+    OutOfMemory {
+        /// Bytes that are enough.
+        need: u64,
+        /// Bytes that are allowed.
+        limit: u64,
+    },
     /// Whoever watched it had enough.
     #[error("the build was cancelled")]
     Cancelled,

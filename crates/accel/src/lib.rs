@@ -39,6 +39,7 @@ mod instance;
 mod kernel;
 mod layout;
 mod local;
+mod memory;
 mod model;
 mod nearest;
 mod normalise;

@@ -216,9 +216,10 @@ impl Model {
         let mut model =
             Self::empty(MeshTree::Binary { tree: nothing, triangles: Vec::new(), depth: 0 }, scale, options);
         // Everything in file order first.
-        let mut triangles: Vec<[Vec3; 3]> = Vec::new();
-        let mut boxes = Vec::new();
-        let mut numbers: Vec<u32> = Vec::new();
+        let all = counts.iter().map(|&count| count as usize).sum();
+        let mut triangles: Vec<[Vec3; 3]> = Vec::with_capacity(all);
+        let mut boxes = Vec::with_capacity(all);
+        let mut numbers: Vec<u32> = Vec::with_capacity(all);
         let mut first = 0;
         for (g, geometry) in geometries.iter().enumerate() {
             let g = g as u32;
@@ -253,6 +254,7 @@ impl Model {
                 }
                 Geometry::Shape(_) | Geometry::User(_) => {
                     let count = counts[g as usize];
+                    model.shapes.reserve(count as usize);
                     model.places.push(Places::Shapes(model.shapes.len() as u32, count));
                     for primitive in 0..count {
                         let shape = match geometry {

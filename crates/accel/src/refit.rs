@@ -5,6 +5,7 @@ use std::sync::Arc;
 use glam::DAffine3;
 
 use crate::instance::Placed;
+use crate::memory;
 use crate::{BuildError, Geometry, Scene};
 
 impl Scene {
@@ -39,12 +40,13 @@ impl Scene {
     /// ```
     ///
     /// # Errors
-    /// When there is no such mesh, it has not as many geometries of the same kind with as many triangles as before, or
-    /// a vertex or index is unusable: see [`BuildError`].
+    /// When there is no such mesh, it has not as many geometries of the same kind with as many triangles as before,
+    /// a vertex or index is unusable, or the memory is limited: see [`BuildError`].
     pub fn refit(&self, mesh: usize, geometries: &[Geometry]) -> Result<Self, BuildError> {
         let mut models = self.models().to_vec();
         let count = models.len();
         let model = models.get_mut(mesh).ok_or(BuildError::UnknownMesh { mesh, count })?;
+        memory::check([geometries], self.placed().len(), self.options())?;
         *model = Arc::new(model.refit(mesh, geometries, self.options())?);
         Self::place(self.options(), models, self.placed().to_vec(), self.mask(), Arc::clone(self.groups()))
     }

@@ -61,5 +61,6 @@ pub(crate) fn moved(
     if refit.growth() <= MOST_GROWTH {
         return Ok((Arc::new(refit), Step::Refitted));
     }
+    drop(refit);
     Ok((Arc::new(Model::new(mesh, parts, options)?), Step::Built))
 }

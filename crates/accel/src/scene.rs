@@ -12,6 +12,7 @@ use crate::groups::Groups;
 use crate::instance::{Instance, Placed, tight_boxes};
 use crate::kernel::Kernel;
 use crate::local::LocalRay;
+use crate::memory::{self, AtOnce};
 use crate::model::{Model, PrimitiveId, Surface, limit};
 use crate::progress::{Progress, Watch as WatchBuild};
 use crate::query::{Any, Closest, Collect, Collector, Dyn, ForKernel};
@@ -79,9 +80,13 @@ impl Scene {
     ) -> Result<Self, BuildError> {
         limit("meshes", meshes.len() as u64)?;
         limit("instances", placed.len() as u64)?;
+        let at_once = memory::check(meshes, placed.len(), options)?;
         let progress = Progress::of(meshes, watch);
         let build = |(i, mesh): (usize, &Vec<Geometry>)| Model::watched(i, mesh, options, &progress).map(Arc::new);
-        let models = meshes.par_iter().enumerate().map(build).collect::<Result<_, _>>()?;
+        let models = match at_once {
+            AtOnce::All => meshes.par_iter().enumerate().map(build).collect::<Result<_, _>>()?,
+            AtOnce::One => meshes.iter().enumerate().map(build).collect::<Result<_, _>>()?,
+        };
         Self::place(options, models, placed, u32::MAX, groups)
     }
 

@@ -7,6 +7,7 @@ use glam::DAffine3;
 use rayon::prelude::*;
 
 use crate::instance::Placed;
+use crate::memory::{self, AtOnce};
 use crate::model::{Model, limit};
 use crate::renew::{self, Followed, Step};
 use crate::{BuildError, Geometry, Scene};
@@ -122,7 +123,8 @@ impl SceneUpdate {
     /// called from; the tree over the instances is always built anew.
     ///
     /// # Errors
-    /// When a change names what does not exist, or a vertex, index or transform is unusable: see [`BuildError`].
+    /// When a change names what does not exist, a vertex, index or transform is unusable, or the memory is limited: see
+    /// [`BuildError`].
     pub fn finish(&self) -> Result<(Scene, Followed), BuildError> {
         if let Some(error) = &self.error {
             return Err(error.clone());
@@ -138,7 +140,10 @@ impl SceneUpdate {
                 Ok((Arc::new(Model::new(i, parts, options)?), Step::Built))
             }
         };
-        let made: Vec<_> = (0..self.count).into_par_iter().map(renewed).collect::<Result<_, BuildError>>()?;
+        let made: Vec<_> = match memory::check(self.meshes.values(), self.placed.len(), options)? {
+            AtOnce::All => (0..self.count).into_par_iter().map(renewed).collect::<Result<_, BuildError>>()?,
+            AtOnce::One => (0..self.count).map(renewed).collect::<Result<_, BuildError>>()?,
+        };
         let followed = Followed::of(made.iter().map(|(_, step)| *step));
         let models = made.into_iter().map(|(model, _)| model).collect();
         let (mask, groups) = (self.scene.mask(), Arc::clone(self.scene.groups()));

@@ -25,6 +25,18 @@ pub(crate) const MAX_DEPTH: u32 = 64;
 /// Primitives in a leaf at most, where one is not all there may be.
 const LEAF: u32 = 8;
 
+/// Bytes of a [`Topology`] of so many boxes, and how many making it takes at most, the same included.
+pub(crate) fn bytes(count: u64) -> (u64, u64) {
+    let node = size_of::<obvhs::bvh2::node::Bvh2Node>() as u64;
+    // obvhs: its boxes; nodes of the tree and two levels of leaves; keys of 32 bytes to sort them by; indices. Where leaves
+    // are collapsed: parents and two counts, candidates and what becomes of them, and a tree of new nodes.
+    let clustering = size_of::<obvhs::aabb::Aabb>() as u64 + 4 * node + 32 + 8;
+    let collapsing = size_of::<obvhs::aabb::Aabb>() as u64 + 4 * node + 24 + 46 + 12;
+    // As pushed: twice what it needs, and the old ones while they move.
+    let topology = size_of::<[Child; 2]>() as u64 * 2 + 4;
+    (count * topology, count * clustering.max(collapsing))
+}
+
 /// What lies below: an inner node, or a run of primitives.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Child {

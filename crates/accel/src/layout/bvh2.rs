@@ -93,6 +93,11 @@ impl<R: Real> Bvh2<R> {
         [(node.children[0], node.child_box(0)), (node.children[1], node.child_box(1))]
     }
 
+    /// Bytes of the nodes over so many primitives at most.
+    pub(crate) fn bytes_of(primitives: u64) -> u64 {
+        primitives * size_of::<Node<R>>() as u64
+    }
+
     /// Memory of the nodes.
     pub(crate) fn bytes(&self) -> usize {
         size_of_val(self.nodes.as_slice())

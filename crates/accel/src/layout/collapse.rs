@@ -263,6 +263,13 @@ impl Part {
         self.order.resize(self.order.len().next_multiple_of(4), u32::MAX);
     }
 
+    /// Gives back the room that was taken in vain: all parts are there before the first is appended.
+    fn shrink_to_fit(&mut self) {
+        self.nodes.shrink_to_fit();
+        self.blocks.shrink_to_fit();
+        self.order.shrink_to_fit();
+    }
+
     /// Appends another part, and says what its references become.
     fn append(&mut self, mut part: Self) -> impl Fn(Reference) -> Reference + use<> {
         self.fill_block();
@@ -282,6 +289,11 @@ impl Part {
 }
 
 impl Wide8 {
+    /// Bytes that making the tree over so many triangles takes at most, the tree included: the plan, and parts that grow.
+    pub(crate) fn making_bytes(triangles: u64) -> u64 {
+        triangles * (size_of::<Inner>() as u64 + 4) + 3 * Self::bytes_of(triangles)
+    }
+
     /// Collapses a binary tree whose leaves hold one primitive each (or few), by dynamic programming over its nodes, on
     /// the threads of the rayon pool it is called from; the same tree for any number.
     ///
@@ -317,6 +329,7 @@ impl Wide8 {
             .map(|task| {
                 let mut part = Part::default();
                 let reference = part.emit(&collapse, task.at, task.depth, &mut None);
+                part.shrink_to_fit();
                 (task, part, reference)
             })
             .collect();

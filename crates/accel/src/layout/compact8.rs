@@ -265,6 +265,12 @@ impl Compact8 {
         Self { root, nodes, words, depth: wide.depth(), sah_cost: wide.sah_cost() }
     }
 
+    /// Bytes of the tree over so many triangles, where it is a bad one: no two triangles share a vertex. Making it takes no
+    /// more than making the wide one.
+    pub(crate) fn bytes_of(triangles: u64) -> u64 {
+        triangles * 44 + (triangles / 7 + 1) * size_of::<Node>() as u64 + 4 * REACH as u64
+    }
+
     /// See [`Wide8::sah_cost`].
     pub(crate) fn sah_cost(&self) -> f64 {
         self.sah_cost

@@ -228,6 +228,13 @@ impl Wide8 {
         size_of_val(self.nodes.as_slice()) + size_of_val(self.blocks.as_slice())
     }
 
+    /// Bytes of the tree over so many triangles with their order, where it is a bad one: leaves that fill three lanes of five,
+    /// and a node to seven triangles.
+    pub(crate) fn bytes_of(triangles: u64) -> u64 {
+        let lanes = triangles * 5 / 3 + 8;
+        lanes * (size_of::<Block>() as u64 / 4 + 4) + (triangles / 7 + 1) * size_of::<Node>() as u64
+    }
+
     /// The triangle at a place, `4 * block + lane`, if there is such a place.
     #[inline(always)]
     pub(crate) fn triangle(&self, place: usize) -> Option<[Vec3; 3]> {

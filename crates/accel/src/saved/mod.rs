@@ -11,6 +11,7 @@ mod write;
 use std::sync::Arc;
 
 use crate::builder::Parts;
+use crate::memory;
 use crate::model::Model;
 use crate::{BuildError, Scene, SceneBuilder};
 
@@ -85,6 +86,8 @@ impl SceneBuilder {
         if trees.len() != meshes.len() {
             return Err(SavedTreesError::Other("not as many meshes"));
         }
+        // They are built one after the other.
+        memory::check(&meshes, instances.len(), options)?;
         let mut models = Vec::with_capacity(meshes.len());
         for (i, (mesh, tree)) in meshes.iter().zip(trees).enumerate() {
             let Some(shape) = tree.shape else {

@@ -101,13 +101,14 @@ pub struct Counting;
 
 impl Counting {
     /// Forgets what was the most; how much is taken now.
-    fn restart() -> usize {
+    pub fn restart() -> usize {
         let now = NOW.load(Relaxed);
         MOST.store(now, Relaxed);
         now
     }
 
-    fn most() -> usize {
+    /// How much was taken at most since then.
+    pub fn most() -> usize {
         MOST.load(Relaxed)
     }
 
