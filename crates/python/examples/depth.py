@@ -16,14 +16,8 @@ low, high = scene.bounds
 middle, size = (low + high) / 2, np.linalg.norm(high - low)
 
 eye = middle + size * np.array([0.5, 0.35, -1.0])
-forward = (middle - eye) / np.linalg.norm(middle - eye)
-right = np.cross(forward, [0, 1, 0])
-right /= np.linalg.norm(right)
-up = np.cross(right, forward)
-x, y = np.meshgrid(np.linspace(-0.34, 0.34, 600), np.linspace(0.34, -0.34, 600))
-directions = forward + x[..., None] * right + y[..., None] * up
-
-hits = scene.closest_hit(eye, directions)  # one origin, 600 x 600 directions
+rays = firsthit.camera_rays(600, 600, position=eye, focal_point=middle, view_angle=37.6)
+hits = scene.closest_hit(rays)
 depth = np.where(hits.hit, hits.t_hit, np.nan)
 
 figure, (a, b) = plt.subplots(1, 2, figsize=(8, 3.6), layout="constrained")

@@ -1,5 +1,6 @@
 //! Answers: arrays that are made when they are asked for.
 
+use std::ops::{Deref, DerefMut};
 use std::sync::{Mutex, PoisonError};
 
 use firsthit_accel::{ClosestPoint, Hit};
@@ -14,14 +15,55 @@ use crate::arrays::module;
 /// The id of what there is not.
 pub(crate) const INVALID_ID: u32 = u32::MAX;
 
+/// Values of one kind. One alone needs no memory of its own: asked for one by one, that would take as long as the answer.
+pub(crate) enum Values<T> {
+    One([T; 1]),
+    Many(Vec<T>),
+}
+
+impl<T: Clone> Values<T> {
+    /// So many times the same. (Memory that is all zeros is not touched before it is written.)
+    pub(crate) fn all(value: T, count: usize) -> Self {
+        if count == 1 { Self::One([value]) } else { Self::Many(vec![value; count]) }
+    }
+}
+
+impl<T> Values<T> {
+    fn into_vec(self) -> Vec<T> {
+        match self {
+            Self::One(one) => one.into(),
+            Self::Many(values) => values,
+        }
+    }
+}
+
+impl<T> Deref for Values<T> {
+    type Target = [T];
+    fn deref(&self) -> &[T] {
+        match self {
+            Self::One(one) => one,
+            Self::Many(values) => values,
+        }
+    }
+}
+
+impl<T> DerefMut for Values<T> {
+    fn deref_mut(&mut self) -> &mut [T] {
+        match self {
+            Self::One(one) => one,
+            Self::Many(values) => values,
+        }
+    }
+}
+
 /// The values of one field: as they were found, until they become an array.
 pub(crate) struct Field<T> {
-    found: Mutex<Vec<T>>,
+    found: Mutex<Values<T>>,
     array: PyOnceLock<Py<PyAny>>,
 }
 
 impl<T> Field<T> {
-    pub(crate) fn new(found: Vec<T>) -> Self {
+    pub(crate) fn new(found: Values<T>) -> Self {
         Self { found: Mutex::new(found), array: PyOnceLock::new() }
     }
 
@@ -34,8 +76,9 @@ impl<T> Field<T> {
         flat: impl FnOnce(Vec<T>) -> Vec<U>,
     ) -> PyResult<Py<PyAny>> {
         let array = self.array.get_or_try_init(py, || {
-            let found = std::mem::take(&mut *self.found.lock().unwrap_or_else(PoisonError::into_inner));
-            let array = PyArray1::from_vec(py, flat(found));
+            let mut found = self.found.lock().unwrap_or_else(PoisonError::into_inner);
+            let found = std::mem::replace(&mut *found, Values::Many(Vec::new()));
+            let array = PyArray1::from_vec(py, flat(found.into_vec()));
             let shape: Vec<usize> = shape.iter().copied().chain(last).collect();
             PyResult::Ok(array.reshape(shape)?.into_any().unbind())
         })?;
@@ -44,14 +87,13 @@ impl<T> Field<T> {
 }
 
 /// Values by field.
-#[derive(Default)]
 pub(crate) struct Found {
-    pub(crate) t: Vec<f64>,
-    pub(crate) instances: Vec<u32>,
-    pub(crate) geometries: Vec<u32>,
-    pub(crate) primitives: Vec<u32>,
-    pub(crate) uvs: Vec<[f32; 2]>,
-    pub(crate) normals: Vec<[f64; 3]>,
+    t: Values<f64>,
+    instances: Values<u32>,
+    geometries: Values<u32>,
+    primitives: Values<u32>,
+    uvs: Values<[f32; 2]>,
+    normals: Values<[f64; 3]>,
 }
 
 /// Part of [`Found`] to be filled.
@@ -65,15 +107,15 @@ pub(crate) struct Slots<'a> {
 }
 
 impl Found {
-    /// Room for so many. (Memory that is all zeros is not touched before it is written.)
+    /// Room for so many.
     pub(crate) fn zeroed(count: usize) -> Self {
         Self {
-            t: vec![0.0; count],
-            instances: vec![0; count],
-            geometries: vec![0; count],
-            primitives: vec![0; count],
-            uvs: vec![[0.0; 2]; count],
-            normals: vec![[0.0; 3]; count],
+            t: Values::all(0.0, count),
+            instances: Values::all(0, count),
+            geometries: Values::all(0, count),
+            primitives: Values::all(0, count),
+            uvs: Values::all([0.0; 2], count),
+            normals: Values::all([0.0; 3], count),
         }
     }
 
@@ -258,7 +300,7 @@ pub struct ClosestPoints {
 }
 
 impl ClosestPoints {
-    pub(crate) fn new(shape: Vec<usize>, found: Found, points: Vec<[f64; 3]>) -> Self {
+    pub(crate) fn new(shape: Vec<usize>, found: Found, points: Values<[f64; 3]>) -> Self {
         Self { fields: Fields::new(shape, found), points: Field::new(points) }
     }
 }
@@ -341,7 +383,7 @@ impl HitLists {
             rays.resize(ends[1] as usize, ray);
         }
         let fields = Fields::new(vec![found.t.len()], found);
-        Self { fields, shape, splits: Field::new(splits), rays: Field::new(rays) }
+        Self { fields, shape, splits: Field::new(Values::Many(splits)), rays: Field::new(Values::Many(rays)) }
     }
 }
 

@@ -8,7 +8,7 @@ use numpy::Element;
 use pyo3::prelude::*;
 
 use crate::error;
-use crate::hits::{ClosestPoints, Found};
+use crate::hits::{ClosestPoints, Found, Values};
 use crate::pool::pool;
 use crate::rays::{End, Points};
 use crate::scene::{CHUNK, Scene, each, in_chunks};
@@ -65,7 +65,12 @@ pub(crate) fn closest(
     let part = points.part();
     let radii = radius.part(part);
     let mut found = Found::zeroed(points.count);
-    let mut places = vec![[0.0; 3]; points.count];
+    let mut places = Values::all([0.0; 3], points.count);
+    if points.count == 1 {
+        let near = scene.trees().closest_point_within(part.vector(0), radii.number(0, 0));
+        found.slots().set_nearest(0, near.as_ref(), &mut places[0]);
+        return Ok(ClosestPoints::new(points.shape, found, places));
+    }
     let parts = found.slots().chunks(CHUNK).into_iter().zip(places.chunks_mut(CHUNK)).collect();
     let item = |i| (part.vector(i), radii.number(i, 0));
     in_chunks(py, (points.count, item), threads, parts, |asked, (mut slots, places)| {

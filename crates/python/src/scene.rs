@@ -296,11 +296,12 @@ impl Scene {
         let seen = self.seen(py, mask);
         let view = rays.view();
         let mut found = Found::zeroed(rays.count);
+        if rays.count == 1 {
+            found.slots().set(0, seen.scene.closest_hit(&view.ray(0)).as_ref());
+            return Ok(Hits::new(rays.shape, found));
+        }
         let parts = found.slots().chunks(CHUNK);
         in_chunks(py, (rays.count, |i| view.ray(i)), threads, parts, |rays, mut part: Slots<'_>| {
-            if let [ray] = rays {
-                return part.set(0, seen.scene.closest_hit(ray).as_ref());
-            }
             // On the stack: it is filled anew for each few, and stays near.
             let mut hits = [None; 64];
             for (k, rays) in rays.chunks(hits.len()).enumerate() {

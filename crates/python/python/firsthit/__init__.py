@@ -9,6 +9,7 @@
 array([ True, False])
 """
 
+from ._camera import camera_rays
 from ._firsthit import INVALID_ID, ClosestPoints, HitLists, Hits, Scene, __version__, load, render
 from ._trimesh import RayMeshIntersector, trimesh_ray
 
@@ -20,6 +21,7 @@ __all__ = [
     "RayMeshIntersector",
     "Scene",
     "__version__",
+    "camera_rays",
     "load",
     "render",
     "trimesh_ray",
