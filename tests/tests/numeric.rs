@@ -230,7 +230,7 @@ fn names_what_exists(document: &str, least: usize) {
     // Names of tests are code spans of three words and more.
     let is_name = |s: &&str| s.matches('_').count() >= 2 && s.chars().all(|c| c.is_ascii_lowercase() || c == '_');
     let mut sources = String::new();
-    let mut folders = vec![root.join("crates"), root.join("tests/tests")];
+    let mut folders = vec![root.join("crates"), root.join("tests/tests"), root.join("tests/checks")];
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir(folder).expect("a folder of the repository").flatten() {
             let path = entry.path();
