@@ -27,6 +27,7 @@ pub(crate) use closest_hit::Closest;
 pub use closest_point::ClosestPoint;
 pub use crossings::Crossings;
 pub(crate) use direct::ForKernel;
+pub(crate) use tally::Crossed;
 
 use crate::{Hit, HitId};
 

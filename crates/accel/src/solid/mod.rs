@@ -14,9 +14,9 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::instance::Instance;
-use crate::kernel::{Exact, Robust};
+use crate::kernel::{Exact, Kernel, Robust};
 use crate::model::{Model, Surface};
-use crate::query::{Collect, Dyn, Take};
+use crate::query::{Collect, Crossed, Dyn, Take};
 use crate::scene::Inner;
 use crate::stats::Off;
 use crate::{Hit, Scene};
@@ -178,11 +178,7 @@ impl Solid {
                 2 * inside > votes as usize
             }
             SignMethod::Pseudonormal => pseudonormal::is_inside(&self.scene, point),
-            SignMethod::Exact => {
-                let mut crossings = self.crossed(self.ray(point, 0).direction);
-                self.exact_crossings(&self.ray(point, 0), &mut crossings);
-                crossings.count % 2 == 1
-            }
+            SignMethod::Exact => self.crossed_by::<Exact>(&self.ray(point, 0)).count % 2 == 1,
         }
     }
 
@@ -239,11 +235,11 @@ impl Solid {
             return self.of_instances(&self.clusters).map(of).sum();
         }
         if self.loops.is_empty() {
-            return self.crossings(&self.ray(point, 0)).signed as f64;
+            return self.crossings(&self.ray(point, 0)).signed() as f64;
         }
         let of_loops = |ray: &Ray<f64>, from: Viewpoint| {
             let open = from.sum(&self.loops)?;
-            Some(self.crossings(ray).signed as f64 + open / (4.0 * PI))
+            Some(self.crossings(ray).signed() as f64 + open / (4.0 * PI))
         };
         // On an edge, as far as can be told: the sum that needs no ray.
         self.attempts(point, of_loops).unwrap_or_else(|| crate::reference::winding_number(&self.scene, point))
@@ -252,10 +248,10 @@ impl Solid {
     /// Whether the winding number is beyond one half: of loops far away not every edge has to be looked at.
     fn is_wound_around(&self, point: DVec3) -> bool {
         if self.loops.is_empty() {
-            return self.crossings(&self.ray(point, 0)).signed != 0;
+            return self.crossings(&self.ray(point, 0)).signed() != 0;
         }
         let of_loops =
-            |ray: &Ray<f64>, from: Viewpoint| from.is_beyond_half(&self.loops, self.crossings(ray).signed as f64);
+            |ray: &Ray<f64>, from: Viewpoint| from.is_beyond_half(&self.loops, self.crossings(ray).signed() as f64);
         let beyond = self.attempts(point, of_loops);
         beyond.unwrap_or_else(|| crate::reference::winding_number(&self.scene, point).abs() > 0.5)
     }
@@ -283,7 +279,8 @@ impl Solid {
         let side = if below[axis] < above[axis] { -1.0 } else { 1.0 };
         // Other directions for other votes: by the golden angle.
         let turn = f64::from(vote) * 2.399_963_229_728_653 + 0.7;
-        let tilt = [0.312_7 * turn.cos() + 0.011_3, 0.287_1 * turn.sin() - 0.017_9];
+        let (sin, cos) = if vote == 0 { FIRST_TURN } else { turn.sin_cos() };
+        let tilt = [0.312_7 * cos + 0.011_3, 0.287_1 * sin - 0.017_9];
         let mut direction = DVec3::ZERO;
         direction[axis] = side;
         direction[(axis + 1) % 3] = tilt[0];
@@ -291,28 +288,32 @@ impl Solid {
         Ray { origin: point, direction, t_min: 0.0, t_max: f64::INFINITY }
     }
 
-    fn crossed(&self, direction: DVec3) -> Crossed<'_> {
-        Crossed { scene: &self.scene, direction, count: 0, signed: 0 }
-    }
-
-    fn crossings(&self, ray: &Ray<f64>) -> Crossed<'_> {
-        let mut crossed = self.crossed(ray.direction);
+    fn crossings(&self, ray: &Ray<f64>) -> Crossed {
+        if let Some(crossed) = self.scene.inner().crossings(ray) {
+            return crossed;
+        }
         if self.scene.options().precision == firsthit_geometry::Precision::Fast {
             // It does not know surfaces.
-            let mut all = Collect::new(ray, None, |_| true, &mut crossed);
-            let _ = self.scene.inner().trace_by::<true, Robust, _, _>(ray, &mut Dyn(&mut all), &mut Off);
-        } else {
-            let mut all = Collect::new(ray, None, |_| true, &mut crossed);
-            let _ = self.scene.collect(ray, crate::Crossings::Surfaces, &mut all);
+            return self.crossed_by::<Robust>(ray);
         }
-        crossed
+        let mut all = Collect::new(ray, None, |_| true, self.nothing(ray));
+        let _ = self.scene.collect(ray, crate::Crossings::Surfaces, &mut all);
+        all.take.crossed
     }
 
-    fn exact_crossings(&self, ray: &Ray<f64>, crossed: &mut Crossed<'_>) {
-        let mut all = Collect::new(ray, None, |_| true, crossed);
-        let _ = self.scene.inner().trace_by::<true, Exact, _, _>(ray, &mut Dyn(&mut all), &mut Off);
+    fn crossed_by<K: Kernel>(&self, ray: &Ray<f64>) -> Crossed {
+        let mut all = Collect::new(ray, None, |_| true, self.nothing(ray));
+        let _ = self.scene.inner().trace_by::<true, K, _, _>(ray, &mut Dyn(&mut all), &mut Off);
+        all.take.crossed
+    }
+
+    fn nothing(&self, ray: &Ray<f64>) -> Triangles<'_> {
+        Triangles { scene: &self.scene, direction: ray.direction, crossed: Crossed::default() }
     }
 }
+
+/// Sine and cosine of 0.7, which most rays are turned by.
+const FIRST_TURN: (f64, f64) = (0.644_217_687_237_691, 0.764_842_187_284_488_5);
 
 /// Directions that are tried.
 const ATTEMPTS: u32 = 16;
@@ -330,22 +331,18 @@ fn boundaries(scene: &Scene) -> Vec<Arc<Boundary>> {
 }
 
 /// Counts crossings of triangles.
-struct Crossed<'a> {
+struct Triangles<'a> {
     scene: &'a Scene,
     direction: DVec3,
-    count: u32,
-    /// Those out of the body less those into it.
-    signed: i64,
+    crossed: Crossed,
 }
 
-impl Take for &mut Crossed<'_> {
+impl Take for Triangles<'_> {
     const ORDERED: bool = false;
 
     fn take(&mut self, hit: Hit, _: &mut f64) -> ControlFlow<(), bool> {
         if matches!(self.scene.surface(&hit.id), Some((_, Surface::Triangle(_)))) {
-            let normal = self.scene.finished(hit).normal_direction;
-            self.count += 1;
-            self.signed += if normal.dot(self.direction) > 0.0 { 1 } else { -1 };
+            self.crossed.add(Crossed::of(self.scene.finished(hit).normal_direction, self.direction));
         }
         ControlFlow::Continue(false)
     }
