@@ -15,11 +15,11 @@ use crate::layout::wide8::Wide8;
 use crate::local::{Line, LocalRay};
 use crate::model::Model;
 use crate::offer::OfferTriangle;
-use crate::scene::{Inner, is_interval};
+use crate::scene::Inner;
 use crate::simd::{self, Available, Lanes, Work};
-use crate::single::{self, careful, tell};
+use crate::single::{self, Entered, Lean, careful, tell};
 use crate::stats::Off;
-use crate::wide::{self, Boxes, Sheared, Visit, WideTree, in_lanes};
+use crate::wide::{self, Boxes, Visit, WideTree};
 
 impl Inner {
     /// Counts the hits of each ray; `false` where this is no such scene, and nothing is done.
@@ -128,14 +128,13 @@ impl Work for Tally<'_> {
 impl Only<'_> {
     #[inline(always)]
     fn cross<L: Lanes>(self, ray: &Ray<f64>) -> Crossed {
-        let Some(local) = LocalRay::enter(ray, self.transform, self.model.extent()).filter(|_| is_interval(ray)) else {
+        let Some(entered) = Entered::<L>::new(ray, self.transform, self.model.extent()) else {
             return Crossed::default();
         };
-        let boxes = Boxes::<L>::of(local.origin32, local.direction32, local.delta);
-        let filter: Sheared<L> =
-            Sheared::new(in_lanes(local.origin32), in_lanes(local.direction32), 0.0, 2.0 * local.delta);
-        let interval = [local.box_t_min(ray.t_min), local.box_t_max(ray.t_max)];
-        let (line, from, unscale) = (local.line(), local.t_min, local.t_unscale);
+        let Entered { line, t_unscale: unscale, interval, .. } = entered;
+        let from = ray.t_min * entered.t_scale;
+        let boxes = Boxes::<L>::inverted(entered.origin, entered.direction, entered.inverse, L::splat(entered.delta));
+        let filter = Robust::picks(&entered);
         let mut visitor = Counter { only: self, ray, line, from, unscale, crossed: Crossed::default() };
         // It never breaks.
         let _ = wide::traverse::<L, _, _, Off, false>(self.tree, &boxes, interval, &filter, &mut Off, &mut visitor);

@@ -17,18 +17,18 @@ use crate::wide::{FARTHEST, SMALLEST, in_lanes};
 /// [`LocalRay::enter`] in their order.
 #[derive(Clone, Copy)]
 pub(crate) struct Entered<L: Lanes> {
-    pub(super) line: Line,
-    pub(super) t_scale: f64,
-    pub(super) t_unscale: f64,
+    pub(crate) line: Line,
+    pub(crate) t_scale: f64,
+    pub(crate) t_unscale: f64,
     /// Not below [`LocalRay::delta`].
-    pub(super) delta: f32,
+    pub(crate) delta: f32,
     /// Origin and direction in single precision, in the first three lanes.
-    pub(super) origin: L,
-    pub(super) direction: L,
+    pub(crate) origin: L,
+    pub(crate) direction: L,
     /// Reciprocals of the direction, finite.
-    pub(super) inverse: L,
+    pub(crate) inverse: L,
     /// The boxes' interval.
-    pub(super) interval: [f32; 2],
+    pub(crate) interval: [f32; 2],
     /// How far moving the origin may put the end of the boxes' interval off.
     slack: f32,
 }
@@ -70,7 +70,7 @@ pub(crate) fn delta_of<F: Four>(apart: F, size: F, least: f64, object: &Extent) 
 impl<L: Lanes> Entered<L> {
     /// `None` as of [`LocalRay::enter`], and for an interval that is none.
     #[inline(always)]
-    pub(super) fn new(ray: &Ray<f64>, transform: &Transform, object: &Extent) -> Option<Self> {
+    pub(crate) fn new(ray: &Ray<f64>, transform: &Transform, object: &Extent) -> Option<Self> {
         if !is_interval(ray) {
             return None;
         }

@@ -12,7 +12,7 @@ use core::ops::ControlFlow;
 
 use firsthit_geometry::{Ray, transform::Transform};
 
-pub(crate) use enter::{delta_of, four, reciprocals};
+pub(crate) use enter::{Entered, delta_of, four, reciprocals};
 pub(crate) use tier::{Lean, careful, tell};
 
 use crate::model::Model;
@@ -20,7 +20,6 @@ use crate::simd::Lanes;
 use crate::stats::Off;
 use crate::wide::{self, Boxes, Visit, WideTree};
 use crate::{Hit, HitId, Scene};
-use enter::Entered;
 use tier::Seen;
 
 /// One instance, of a model with a wide tree (or a compact one): what is above it, if anything, has been traversed.

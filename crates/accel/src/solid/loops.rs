@@ -243,22 +243,30 @@ impl Viewpoint {
     /// Whether a winding number of so many crossings, and of what the loops add, is beyond one half of either sign. `None` as of
     /// [`Viewpoint::sum`].
     pub(super) fn is_beyond_half(&self, of: &[Placed], crossings: f64) -> Option<bool> {
-        let mut sums = Sums { from: self, of, angle: 0.0, off: 0.0, seen: BinaryHeap::new() };
-        for (instance, placed) in (0..).zip(of) {
-            if !placed.loops.nodes.is_empty() {
-                sums.look(instance, 0)?;
+        let mut sums = Sums { from: self, of, angle: 0.0, off: 0.0, seen: Vec::new(), keeps: false };
+        // Mostly a first look will do: nothing is kept for a second one.
+        for keeps in [false, true] {
+            sums = Sums { angle: 0.0, off: 0.0, keeps, ..sums };
+            for (instance, placed) in (0..).zip(of) {
+                if !placed.loops.nodes.is_empty() {
+                    sums.look(instance, 0)?;
+                }
+            }
+            if let Some(beyond) = sums.tell(crossings) {
+                return Some(beyond);
             }
         }
-        loop {
-            let beyond = (crossings + sums.angle / (4.0 * PI)).abs() - 0.5;
-            if beyond.abs() > sums.off / (4.0 * PI) + ROUNDED {
-                return Some(beyond > 0.0);
-            }
-            let Some(worst) = sums.seen.pop() else { return Some(beyond > 0.0) };
+        let mut seen = BinaryHeap::from(std::mem::take(&mut sums.seen));
+        while let Some(worst) = seen.pop() {
             sums.angle -= worst.angle;
             sums.off -= worst.off;
             sums.look_closely(worst.instance, worst.node)?;
+            seen.extend(sums.seen.drain(..));
+            if let Some(beyond) = sums.tell(crossings) {
+                return Some(beyond);
+            }
         }
+        Some(sums.beyond(crossings) > 0.0)
     }
 }
 
@@ -268,17 +276,32 @@ struct Sums<'a> {
     of: &'a [Placed],
     angle: f64,
     off: f64,
-    seen: BinaryHeap<Seen>,
+    /// What was looked at, if it is kept.
+    seen: Vec<Seen>,
+    keeps: bool,
 }
 
 impl Sums<'_> {
+    /// How far the number is beyond one half of either sign.
+    fn beyond(&self, crossings: f64) -> f64 {
+        (crossings + self.angle / (4.0 * PI)).abs() - 0.5
+    }
+
+    /// Whether it is, if that is known.
+    fn tell(&self, crossings: f64) -> Option<bool> {
+        let beyond = self.beyond(crossings);
+        (beyond.abs() > self.off / (4.0 * PI) + ROUNDED).then_some(beyond > 0.0)
+    }
+
     fn look(&mut self, instance: u32, node: u32) -> Option<()> {
         let placed = &self.of[instance as usize];
         match placed.about(node, self.from) {
             Some((angle, off)) => {
                 self.angle += angle;
                 self.off += off;
-                self.seen.push(Seen { off, angle, instance, node });
+                if self.keeps {
+                    self.seen.push(Seen { off, angle, instance, node });
+                }
                 Some(())
             }
             None => self.look_closely(instance, node),
