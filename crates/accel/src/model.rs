@@ -6,9 +6,10 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use firsthit_geometry::{
-    Aabb, Precision, Primitive, Ray, Real, SurfaceHit, exact::Root, transform::Transform, triangle,
+    Aabb, Precision, Primitive, Ray, Real, SurfaceHit, exact::Root, shapes::ClosestOnSurface, transform::Transform,
+    triangle,
 };
-use glam::{DVec3, Vec3};
+use glam::{DAffine3, DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 
 use crate::build::Topology;
@@ -626,6 +627,18 @@ impl Model {
         Some((self.number(place)?, self.triangle(place)?))
     }
 
+    /// The shape at a place of a binary tree, with its number; `None` where there is none, but a triangle perhaps.
+    pub(crate) fn numbered_shape(&self, place: usize) -> Option<(u32, &ModelShape)> {
+        Some((self.number(place)?, self.shapes.get(self.shape_at(place)? as usize)?))
+    }
+
+    /// The shapes in the tree with their numbers, or those that have no finite box and are in none.
+    pub(crate) fn each_shape(&self, bounded: bool, mut f: impl FnMut(u32, &ModelShape)) {
+        for shape in self.shapes.iter().filter(|shape| shape.bounds.is_finite() == bounded) {
+            f(self.firsts[shape.geometry as usize] + shape.primitive, shape);
+        }
+    }
+
     /// All triangles in the tree with their numbers, in the caller's order.
     pub(crate) fn each_triangle(&self, mut f: impl FnMut(u32, [Vec3; 3])) {
         for (places, &first) in self.places.iter().zip(&self.firsts) {
@@ -822,6 +835,11 @@ impl Model {
 }
 
 impl ModelShape {
+    /// The point nearest to the origin, of the shape as a map of the normalised space places it.
+    pub(crate) fn closest_to_origin(&self, linear: DMat3, translation: DVec3) -> Option<ClosestOnSurface> {
+        self.shape.closest_to_origin(&DAffine3 { matrix3: linear * (1.0 / self.scale), translation })
+    }
+
     /// [`Primitive::refine`] for a point of the normalised space.
     pub(crate) fn refine(&self, point: DVec3, normal: Option<DVec3>) -> (DVec3, f64) {
         let (point, error) = self.shape.refine(point * self.scale, normal);

@@ -13,11 +13,12 @@ use firsthit_geometry::triangle_pair::{meet, meet_otherwise};
 use firsthit_geometry::{
     Primitive, Ray,
     exact::{ExactRay, Root},
+    transform::Transform,
     triangle::{self, Shear},
 };
 use glam::DVec3;
 
-use crate::model::Surface;
+use crate::model::{ModelShape, Surface};
 use crate::region::{meets, separation};
 use crate::{BodyHit, ClosestPoint, Crossings, Hit, HitId, Part, Scene, Separation, SphereHit, VisitedTriangle};
 
@@ -138,14 +139,14 @@ pub fn any_hit(scene: &Scene, ray: &Ray<f64>) -> bool {
     !all_hits(scene, ray).is_empty()
 }
 
-/// The nearest point of all triangles, each measured in the world in `f64`; of several that are equally near, that of the
-/// smallest id.
+/// The nearest point of all triangles and shapes, each measured in the world in `f64`; of several that are equally near,
+/// that of the smallest id.
 #[must_use]
 pub fn closest_point(scene: &Scene, point: DVec3) -> Option<ClosestPoint> {
     nearest_k(scene, point, 1, f64::INFINITY).into_iter().next()
 }
 
-/// So many triangles with their nearest points, not farther than `radius`: by distance, then by id.
+/// So many triangles and shapes with their nearest points, not farther than `radius`: by distance, then by id.
 #[must_use]
 pub fn nearest_k(scene: &Scene, point: DVec3, count: usize, radius: f64) -> Vec<ClosestPoint> {
     if !point.is_finite() {
@@ -161,6 +162,14 @@ pub fn nearest_k(scene: &Scene, point: DVec3, count: usize, radius: f64) -> Vec<
             let (point, feature, normal_direction) = (point + at.point, at.feature(), (b - a).cross(c - a));
             all.push((squared, ClosestPoint { id, point, distance, u, v, feature, normal_direction }));
         }
+    }
+    for (id, transform, shape) in shapes(scene) {
+        let seen = shape.closest_to_origin(transform.linear(), transform.translation() - point);
+        let Some(on) = seen.filter(|on| on.point.length_squared().sqrt() <= radius) else { continue };
+        let (distance, u, v) = (on.point.length(), on.u as f32, on.v as f32);
+        let normal_direction = transform.normal_direction(on.normal.unwrap_or(DVec3::ZERO));
+        let (squared, point, feature) = (on.point.length_squared(), point + on.point, Feature::Face);
+        all.push((squared, ClosestPoint { id, point, distance, u, v, feature, normal_direction }));
     }
     all.sort_by(|(d, a), (e, b)| d.total_cmp(e).then(a.id.cmp(&b.id)));
     all.into_iter().map(|(_, nearest)| nearest).take(count).collect()
@@ -283,6 +292,17 @@ fn placed(scene: &Scene, point: DVec3) -> impl Iterator<Item = (HitId, [DVec3; 3
             let Surface::Triangle(corners) = surface else { return None };
             let id = HitId { instance: i, geometry: id.geometry, primitive: id.primitive };
             Some((id, corners.map(|p| linear * p + offset)))
+        })
+    })
+}
+
+/// All that is no triangle, with the transforms of the instances.
+fn shapes(scene: &Scene) -> impl Iterator<Item = (HitId, &Transform, &ModelShape)> {
+    scene.shown().flat_map(move |(i, instance)| {
+        scene.models()[instance.model as usize].surfaces().filter_map(move |(id, surface)| {
+            let Surface::Shape(shape) = surface else { return None };
+            let id = HitId { instance: i, geometry: id.geometry, primitive: id.primitive };
+            Some((id, &instance.transform, shape))
         })
     })
 }

@@ -436,6 +436,11 @@ impl Inner {
         !self.unbounded.is_empty()
     }
 
+    /// Those instances.
+    pub(crate) fn unbounded(&self) -> &[u32] {
+        &self.unbounded
+    }
+
     /// An instance, and what is placed by it.
     #[inline(always)]
     pub(crate) fn placed(&self, i: u32) -> (&Instance, &Model) {

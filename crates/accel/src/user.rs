@@ -5,9 +5,10 @@ use core::ops::ControlFlow;
 use std::sync::Arc;
 
 use firsthit_geometry::exact::Root;
-use firsthit_geometry::shapes::ExactVisitor;
+use firsthit_geometry::shapes::{ClosestOnSurface, ExactVisitor};
+use firsthit_geometry::transform::similarity;
 use firsthit_geometry::{Aabb, ExactSurfaceHit, Primitive, Ray, Shape, SurfaceHit};
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 
 /// Primitives that the user tests: voxels, curves, height fields, distance functions, anything with a box that a ray can be
 /// tested against. They are in the same trees as triangles, and instances place and scale them.
@@ -16,8 +17,9 @@ use glam::DVec3;
 /// from several threads. Number and boxes must not change while a scene is built and lives. A panic in here ends the query that
 /// asked.
 ///
-/// Every query about rays meets them (at the tier `Exact` what is reported is taken for exact). Queries about points and
-/// triangles in regions do not; those about parts tell them by their boxes.
+/// Every query about rays meets them (at the tier `Exact` what is reported is taken for exact). Those about nearest points do
+/// where [`UserPrimitives::closest_point`] is there. Queries about triangles in regions do not; those about parts tell them
+/// by their boxes.
 ///
 /// ```
 /// use std::sync::Arc;
@@ -72,6 +74,16 @@ pub trait UserPrimitives: fmt::Debug + Send + Sync {
         (point, point.abs().max_element() * (64.0 * f64::EPSILON))
     }
 
+    /// The point of the primitive that is nearest to `point`, for [`Scene::closest_point`](crate::Scene::closest_point) and its
+    /// kin. `None`, as it stands: for these queries it is not there. The point must lie in the primitive's box; one that is not
+    /// finite is not taken. Parameters and normal are as of a hit there.
+    ///
+    /// Nearest here is nearest in the world only where an instance's transform keeps angles, so it is asked about in such
+    /// instances alone.
+    fn closest_point(&self, _primitive: u32, _point: DVec3) -> Option<ClosestOnSurface> {
+        None
+    }
+
     /// Whether each of them is met by a straight line once at most, so that a ray that starts on one need not be tested against it.
     fn is_flat(&self) -> bool {
         false
@@ -87,6 +99,21 @@ pub(crate) enum OtherSurface {
 }
 
 impl OtherSurface {
+    /// The point nearest to the origin of the primitive as placed by a map.
+    pub(crate) fn closest_to_origin(&self, placed: &DAffine3) -> Option<ClosestOnSurface> {
+        match self {
+            Self::Shape(shape) => shape.closest_to_origin(placed),
+            Self::User(user, primitive) => {
+                let scale = similarity(&placed.matrix3)?;
+                // The inverse of a turn is its transpose.
+                let origin = placed.matrix3.transpose() * (-placed.translation / scale) / scale;
+                let nearest = user.closest_point(*primitive, origin)?;
+                let point = placed.transform_point3(nearest.point);
+                point.is_finite().then_some(ClosestOnSurface { point, ..nearest })
+            }
+        }
+    }
+
     /// So many times at most a ray is asked to go on.
     pub(crate) fn most_hits(&self) -> usize {
         match self {

@@ -62,8 +62,7 @@ impl Transform {
             return Err(TransformError::NotFinite);
         }
         // A power of two taken out keeps determinants of tiny and huge scales from under- and overflowing.
-        let largest = m.matrix3.to_cols_array().iter().fold(0.0f64, |a, x| a.max(x.abs()));
-        let k = largest.power_of_two_below();
+        let k = largest(&m.matrix3).power_of_two_below();
         let unit = m.matrix3 * (1.0 / k);
         let cofactor = cofactor(unit);
         let det = unit.x_axis.dot(cofactor.x_axis);
@@ -233,6 +232,22 @@ impl Transform {
         let pad = self.point_error(aabb.min.abs().max(aabb.max.abs()), DVec3::ZERO) * 2.0 + h * gamma(8);
         Aabb::new(c - h - pad, c + h + pad)
     }
+}
+
+/// By how much a map that keeps angles makes everything longer; `None` for other maps. Some roundings are let pass.
+#[must_use]
+pub fn similarity(linear: &DMat3) -> Option<f64> {
+    let k = largest(linear).power_of_two_below();
+    let m = *linear * (1.0 / k);
+    let squares = m.transpose() * m;
+    let square = (squares.x_axis.x + squares.y_axis.y + squares.z_axis.z) / 3.0;
+    let off = squares - DMat3::from_diagonal(DVec3::splat(square));
+    (largest(&off) <= square * (16.0 * f64::EPSILON)).then(|| square.sqrt() * k)
+}
+
+/// The largest component by magnitude.
+pub(crate) fn largest(m: &DMat3) -> f64 {
+    m.to_cols_array().into_iter().fold(0.0, |largest, x| x.abs().max(largest))
 }
 
 /// `n` roundings. (Named in full: std will have a `f64::gamma` of another meaning.)

@@ -8,6 +8,7 @@ mod hard;
 mod invariance;
 mod leaks;
 mod nearest;
+mod nearest_shapes;
 mod packets;
 mod rays;
 mod region;

@@ -10,7 +10,7 @@ use crate::single::{mesh, place, vector};
 use crate::{careful, triangles};
 
 /// Of the same triangle and to the bit, but for the normal, which the twin has of another length.
-fn same(got: &Option<ClosestPoint>, expected: &Option<ClosestPoint>) -> Result<(), TestCaseError> {
+pub(super) fn same(got: &Option<ClosestPoint>, expected: &Option<ClosestPoint>) -> Result<(), TestCaseError> {
     let bits = |c: &ClosestPoint| {
         let numbers = [c.point.x, c.point.y, c.point.z, c.distance, c.u.into(), c.v.into()];
         (c.id, c.feature, numbers.map(f64::to_bits))

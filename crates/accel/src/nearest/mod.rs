@@ -13,7 +13,7 @@ use firsthit_geometry::transform::Transform;
 use glam::{DMat3, DVec3, Vec3};
 
 use crate::kernel::double;
-use crate::model::Model;
+use crate::model::{Model, ModelShape};
 use crate::simd;
 use walk::{Search, Triangles};
 
@@ -23,7 +23,7 @@ const FAR: f32 = (1 << 30) as f32;
 pub(crate) use bounds::Point;
 pub(crate) use walk::{Boxed, squared_distance, walk, walk_binary};
 
-/// A point near the one that is asked about: of an instance's triangle.
+/// A point near the one that is asked about: of an instance's triangle, or of something else in it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Near {
     /// Index of the instance.
@@ -32,7 +32,7 @@ pub(crate) struct Near {
     pub(crate) number: u32,
     /// Squared distance in the world.
     pub(crate) squared: f64,
-    /// The point, relative to the one that is asked about, and where on the triangle it is.
+    /// The point, relative to the one that is asked about, and where on the triangle it is; of a shape, somewhere inside.
     pub(crate) at: ClosestPoint<f64>,
 }
 
@@ -49,6 +49,10 @@ pub(crate) trait Keep {
     fn limit(&self) -> f64;
     /// Gets what lies within the limit.
     fn offer(&mut self, near: Near);
+    /// Whether what is no triangle is wanted too.
+    fn shapes(&self) -> bool {
+        true
+    }
 }
 
 /// An instance as seen from the point.
@@ -106,6 +110,9 @@ impl<'a> Seen<'a> {
         // From so far that single precision tells nothing (or from where distances are no numbers) all is looked at.
         if !(self.point.abs().max_element() < FAR) {
             model.each_triangle(|number, vertices| self.triangle(number, &double(&vertices), keep));
+            if keep.shapes() {
+                model.each_shape(true, |number, shape| self.shape(number, shape, keep));
+            }
         } else if let Some((tree, level)) = model.wide() {
             simd::run(level, Search(Triangles { seen: self, tree, keep }));
         } else if let Some((tree, level)) = model.compact() {
@@ -121,11 +128,28 @@ impl<'a> Seen<'a> {
                     for place in places {
                         if let Some((number, vertices)) = model.numbered(place) {
                             self.triangle(number, &double(&vertices), keep);
+                        } else if let Some((number, shape)) = model.numbered_shape(place).filter(|_| keep.shapes()) {
+                            self.shape(number, shape, keep);
                         }
                     }
                     limit(keep)
                 },
             );
+        }
+    }
+
+    /// Offers those shapes of the model that lie within the limit and have no finite box, so that they are in no tree.
+    pub(crate) fn search_unbounded(&self, keep: &mut dyn Keep) {
+        self.model.each_shape(false, |number, shape| self.shape(number, shape, keep));
+    }
+
+    /// Measures the shape with this number, if it has nearest points.
+    pub(crate) fn shape(&self, number: u32, shape: &ModelShape, keep: &mut dyn Keep) {
+        let Some(nearest) = shape.closest_to_origin(self.linear, self.offset) else { return };
+        let squared = nearest.point.length_squared();
+        if squared <= keep.limit() {
+            let at = ClosestPoint { point: nearest.point, weights: [1.0 / 3.0; 3] };
+            keep.offer(Near { instance: self.instance, number, squared, at });
         }
     }
 

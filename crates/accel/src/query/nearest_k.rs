@@ -1,4 +1,4 @@
-//! The nearest triangles.
+//! The nearest triangles and shapes.
 
 use std::collections::BinaryHeap;
 
@@ -54,8 +54,8 @@ impl Keep for Few {
 }
 
 impl Scene {
-    /// The `count` triangles that are nearest to `point` and not farther than `radius`, each with its nearest point: by
-    /// distance, then by id. See [`Scene::closest_point`].
+    /// The `count` triangles, shapes and primitives of the user's own that are nearest to `point` and not farther than
+    /// `radius`, each with its nearest point: by distance, then by id. See [`Scene::closest_point`].
     ///
     /// ```
     /// # use firsthit_accel::{Geometry, SceneBuilder};

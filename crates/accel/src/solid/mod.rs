@@ -195,15 +195,17 @@ impl Solid {
         chunks.for_each(|(points, inside)| self.contains_each(points, inside));
     }
 
-    /// [`Scene::distance`], negative inside.
+    /// [`Scene::distance`] of the triangles, negative inside.
     #[must_use]
     pub fn signed_distance(&self, point: DVec3) -> f64 {
-        self.signed(point, self.scene.distance(point))
+        let mut distance = [0.0];
+        self.signed_distances(&[point], &mut distance);
+        distance[0]
     }
 
     /// [`Solid::signed_distance`] for each point, into the slot of the same index. The shorter slice decides how many.
     pub fn signed_distances(&self, points: &[DVec3], distances: &mut [f64]) {
-        self.scene.distances(points, distances);
+        self.scene.distances_of_triangles(points, distances);
         for (point, distance) in points.iter().zip(distances) {
             *distance = self.signed(*point, *distance);
         }

@@ -31,6 +31,9 @@ impl Keep for Ties {
         }
         self.all.push(near);
     }
+    fn shapes(&self) -> bool {
+        false
+    }
 }
 
 /// Whether a point is behind what is nearest to it.

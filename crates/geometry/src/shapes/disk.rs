@@ -72,7 +72,7 @@ impl<R: Real> Disk<R> {
     }
 
     /// The hit at a point given relative to the centre.
-    fn hit(&self, t: R, l: R::Vec3) -> SurfaceHit<R> {
+    pub(super) fn hit(&self, t: R, l: R::Vec3) -> SurfaceHit<R> {
         let (tangent, bitangent) = tangents::<R>(self.plane.normal());
         let width = self.radius - self.inner_radius;
         let v = if width > R::ZERO { (l.length() - self.inner_radius) / width } else { R::ZERO };

@@ -171,9 +171,11 @@ pub enum ShapeError {
     Degenerate(&'static str),
 }
 
+mod closest;
 mod common;
 mod cuboid;
 mod disk;
+mod ellipsoid;
 mod exact;
 mod plane;
 mod polygon;
@@ -182,6 +184,7 @@ mod quadric_bounds;
 mod solid;
 mod sphere;
 
+pub use closest::ClosestOnSurface;
 pub use cuboid::Cuboid;
 pub use disk::Disk;
 pub use plane::Plane;

@@ -95,7 +95,7 @@ impl<R: Real> Plane<R> {
         self.crossing(ray).filter(|&t| ray.contains(t) && t.is_finite())
     }
 
-    fn hit(&self, ray: &Ray<R>, t: R) -> SurfaceHit<R> {
+    pub(super) fn hit(&self, ray: &Ray<R>, t: R) -> SurfaceHit<R> {
         let l = (ray.origin - self.point) + ray.direction * t;
         let (tangent, bitangent) = tangents::<R>(self.normal);
         SurfaceHit::new(t, l.dot(tangent), l.dot(bitangent), Some(self.normal))

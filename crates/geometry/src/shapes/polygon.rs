@@ -126,6 +126,10 @@ impl<R: Real> Polygon<R> {
         &self.loops
     }
 
+    pub(super) fn plane(&self) -> &Plane<R> {
+        &self.plane
+    }
+
     /// The unit normal, if the first loop has an orientation.
     #[must_use]
     pub fn normal(&self) -> Option<R::Vec3> {
@@ -147,7 +151,7 @@ impl<R: Real> Polygon<R> {
         self.edges.iter().fold(false, |inside, edge| inside != edge.crosses(p))
     }
 
-    fn hit(&self, ray: &Ray<R>, t: R) -> SurfaceHit<R> {
+    pub(super) fn hit(&self, ray: &Ray<R>, t: R) -> SurfaceHit<R> {
         let p = ray.at(t);
         let [u, v] = self.kept.map(|axis| {
             let (low, high) = (self.bounds.min.axis(axis), self.bounds.max.axis(axis));

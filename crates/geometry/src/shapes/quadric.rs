@@ -377,6 +377,11 @@ impl<R: Real> Quadric<R> {
         SurfaceHit::new(t, longitude::<R>(p), v, normal)
     }
 
+    /// What a hit at a point of the surface says of it.
+    pub(super) fn on(&self, point: R::Vec3) -> SurfaceHit<R> {
+        self.surface_hit(R::ZERO, point * (R::ONE / self.size))
+    }
+
     /// The hit at a parameter of the local line.
     pub(super) fn hit_at(&self, line: &LocalLine<R>, t: R, local_t: R) -> SurfaceHit<R> {
         self.surface_hit(t, Self::local_point(line, local_t))

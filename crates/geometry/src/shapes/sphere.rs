@@ -99,7 +99,7 @@ impl<R: Real> Sphere<R> {
         Some([t0 * scale, t1 * scale])
     }
 
-    fn hit(&self, ray: &Ray<R>, t: R) -> SurfaceHit<R> {
+    pub(super) fn hit(&self, ray: &Ray<R>, t: R) -> SurfaceHit<R> {
         let normal = unit::<R>((ray.origin - self.center) + ray.direction * t);
         let n = normal.unwrap_or_default();
         let latitude = n.y().to_f64().clamp(-1.0, 1.0).asin() / core::f64::consts::PI + 0.5;

@@ -235,14 +235,14 @@ class Scene:
     def closest_point(
         self, points: ArrayLike, *, radius: ArrayLike | None = None, mask: int | None = None, threads: int = 0
     ) -> ClosestPoints:
-        """The nearest point of the triangles, for points of shape ``(..., 3)``; with a radius, one for all or one for
+        """The nearest point of the surface (of files: of shapes too), for points of shape ``(..., 3)``; with a radius, one for all or one for
         each, only if it is not farther."""
     def distance(self, points: ArrayLike, *, mask: int | None = None, threads: int = 0) -> NDArray[np.float64]:
-        """How far the triangles are; infinity if there are none, NaN for a point that is not finite."""
+        """How far the surface is; infinity if there is none, NaN for a point that is not finite."""
     def signed_distance(
         self, points: ArrayLike, *, sign: _Sign = "auto", mask: int | None = None, threads: int = 0
     ) -> NDArray[np.float64]:
-        """`distance`, negative inside.
+        """`distance` of the triangles, negative inside.
 
         ``sign`` is how inside is told from outside: by the winding number (which holes do not upset; ``"fast_winding"``
         sums it over clusters of triangles), by the parity of the crossings of a ray (``"exact"`` decides them exactly),
