@@ -165,6 +165,14 @@ impl Above {
         if let AboveTree::Wide(wide) = &self.tree { Some((wide, &self.order)) } else { None }
     }
 
+    /// How many nodes there are.
+    pub(crate) fn node_count(&self) -> usize {
+        match &self.tree {
+            AboveTree::Binary(tree) => tree.node_count(),
+            AboveTree::Wide(wide) => wide.nodes.len(),
+        }
+    }
+
     /// The root, where that is a node.
     pub(crate) fn first(&self) -> Option<u32> {
         match &self.tree {

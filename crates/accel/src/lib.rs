@@ -65,6 +65,7 @@ mod surface_point;
 mod traverse;
 mod update;
 mod user;
+mod validate;
 mod visit_order;
 mod wide;
 
@@ -83,5 +84,6 @@ pub use simd::Level;
 pub use solid::{SignMethod, Solid};
 pub use update::SceneUpdate;
 pub use user::UserPrimitives;
+pub use validate::{InvalidTree, TreeFault};
 #[doc(hidden)]
 pub use visit_order::VisitOrder;

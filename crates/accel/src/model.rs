@@ -100,7 +100,7 @@ pub(crate) struct ModelShape {
     pub(crate) primitive: u32,
     pub(crate) shape: OtherSurface,
     /// Its box, normalised.
-    bounds: Aabb<f64>,
+    pub(crate) bounds: Aabb<f64>,
     /// Size of the normalised space's unit, a power of two.
     scale: f64,
 }
@@ -859,6 +859,26 @@ impl ModelShape {
     /// Whether no straight ray that leaves it can come back.
     pub(crate) fn is_flat(&self) -> bool {
         self.shape.is_flat()
+    }
+}
+
+/// Damage, for tests.
+#[cfg(test)]
+impl Model {
+    pub(crate) fn shrink_a_box(&mut self) {
+        match &mut self.tree {
+            MeshTree::Binary { tree, .. } => tree.shrink_a_box(),
+            MeshTree::Wide { tree, .. } => tree.shrink_a_box(),
+            MeshTree::Compact { tree, .. } => tree.shrink_a_box(),
+        }
+    }
+
+    pub(crate) fn numbers_mut(&mut self) -> &mut [u32] {
+        &mut self.numbers
+    }
+
+    pub(crate) fn wide_mut(&mut self) -> Option<&mut Wide8> {
+        if let MeshTree::Wide { tree, .. } = &mut self.tree { Some(tree) } else { None }
     }
 }
 

@@ -20,6 +20,7 @@ mod spawn;
 mod twins;
 mod update;
 mod user;
+mod validate;
 
 use firsthit_accel::{BuildOptions, Geometry, Hit, HitId, Scene, SceneBuilder};
 use firsthit_geometry::Precision;

@@ -76,6 +76,7 @@ proptest! {
                 hostile[at..at + 4].copy_from_slice(&to.to_le_bytes());
             }
             if let Ok(other) = builder.clone().build_with_trees(&signed(hostile)) {
+                prop_assert_eq!(other.validate(), Ok(()));
                 for ray in &rays {
                     prop_assert_eq!(bits(&scene.closest_hit(ray)), bits(&other.closest_hit(ray)));
                 }
@@ -143,6 +144,7 @@ fn the_bunny_from_a_file() {
             }
             if let Ok(other) = builder.clone().build_with_trees(&signed(hostile)) {
                 accepted += 1;
+                assert_eq!(other.validate(), Ok(()));
                 for ray in &rays {
                     assert_eq!(bits(&scene.closest_hit(ray)), bits(&other.closest_hit(ray)));
                 }

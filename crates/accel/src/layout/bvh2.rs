@@ -93,6 +93,11 @@ impl<R: Real> Bvh2<R> {
         [(node.children[0], node.child_box(0)), (node.children[1], node.child_box(1))]
     }
 
+    /// How many nodes there are.
+    pub(crate) fn node_count(&self) -> usize {
+        self.nodes.len()
+    }
+
     /// Bytes of the nodes over so many primitives at most.
     pub(crate) fn bytes_of(primitives: u64) -> u64 {
         primitives * size_of::<Node<R>>() as u64
@@ -108,6 +113,14 @@ impl<R: Real> Node<R> {
     fn child_box(&self, child: usize) -> Aabb<R> {
         let [x, y, z] = self.planes.map(|p| p.map(|side| side[child]));
         Aabb::new(R::Vec3::new(x[0], y[0], z[0]), R::Vec3::new(-x[1], -y[1], -z[1]))
+    }
+}
+
+#[cfg(test)]
+impl<R: Real> Bvh2<R> {
+    /// A box that no longer holds what is below, for tests.
+    pub(crate) fn shrink_a_box(&mut self) {
+        self.nodes[0].planes[0][1][0] = -self.nodes[0].planes[0][0][0];
     }
 }
 

@@ -298,6 +298,26 @@ impl Compact8 {
         self.words.get(place.checked_sub(triangle.count())?).copied()
     }
 
+    /// How many nodes there are.
+    pub(crate) fn node_count(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// The places of a leaf, if that is there and whole.
+    pub(crate) fn leaf_places(&self, at: Reference) -> Option<core::ops::Range<usize>> {
+        let (first, count) = ((at.0 & (PLACES - 1)) as usize, (at.0 >> 28 & 7) as usize + 1);
+        let triangles = self.words.get(first..first + count)?;
+        let vertices = Triangle(triangles[0]).vertices();
+        let whole = |(lane, word): (usize, &u32)| {
+            let t = Triangle(*word);
+            let shape = (t.lane(), t.count(), t.vertices()) == (lane, count, vertices);
+            shape && (0..3).all(|k| t.vertex(k) < vertices)
+        };
+        let end = first + count + 3 * vertices;
+        let there = first >= count && end + REACH <= self.words.len();
+        (there && triangles.iter().enumerate().all(whole)).then_some(first..first + count)
+    }
+
     /// All places of triangles.
     pub(crate) fn places(&self) -> impl Iterator<Item = usize> + '_ {
         let children = self.nodes.iter().flat_map(|n| n.children);
@@ -306,6 +326,14 @@ impl Compact8 {
             let first = (at.0 & (PLACES - 1)) as usize;
             first..first + (at.0 >> 28 & 7) as usize + 1
         })
+    }
+}
+
+#[cfg(test)]
+impl Compact8 {
+    /// A box that no longer holds what is below, for tests.
+    pub(crate) fn shrink_a_box(&mut self) {
+        self.nodes[0].planes[1][0] = self.nodes[0].planes[0][0];
     }
 }
 

@@ -242,6 +242,14 @@ impl Wide8 {
     }
 }
 
+#[cfg(test)]
+impl Wide8 {
+    /// A box that no longer holds what is below, for tests.
+    pub(crate) fn shrink_a_box(&mut self) {
+        self.nodes[0].planes[1][0] = self.nodes[0].planes[0][0];
+    }
+}
+
 impl WideTree for Wide8 {
     type Node = Node;
     type Leaf<'a> = Blocks<'a>;

@@ -150,7 +150,7 @@ impl Inner {
 
 impl crate::model::Model {
     /// Where its tree begins.
-    fn first(&self) -> Option<At> {
+    pub(crate) fn first(&self) -> Option<At> {
         let wide = |root: Reference| (root != Reference::NOTHING).then_some(At::Wide(root));
         if let Some((tree, _)) = self.wide() {
             wide(tree.root())
@@ -162,7 +162,7 @@ impl crate::model::Model {
     }
 
     /// Tells what is below a node, with its boxes; whether it is one.
-    fn below(&self, at: At, f: &mut dyn FnMut(At, &Aabb<f64>)) -> bool {
+    pub(crate) fn below(&self, at: At, f: &mut dyn FnMut(At, &Aabb<f64>)) -> bool {
         match at {
             At::Binary(node) if !node.is_leaf() => {
                 for (child, bounds) in self.binary().into_iter().flat_map(|tree| tree.below(node.first)) {

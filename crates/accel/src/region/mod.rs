@@ -20,6 +20,7 @@ use crate::{HitId, Scene};
 use cursor::Cursor;
 
 pub use cast::{BodyHit, SphereHit};
+pub(crate) use cursor::At;
 pub(crate) use overlap::meets;
 pub(crate) use pairs::separation;
 pub use pairs::{CurveSegment, Separation};
