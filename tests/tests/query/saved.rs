@@ -112,6 +112,32 @@ fn trees_of_something_else_are_refused() {
     assert!(matches!(got, Err(SavedTreesError::Foreign)));
 }
 
+/// A file need not be read into memory first: its bytes may be a map of it.
+#[test]
+fn a_mapped_file_gives_the_same_answers() {
+    let grid = (0..400u32).map(|k| Vec3::new((k % 20) as f32, (k * k % 7) as f32, (k / 20) as f32)).collect();
+    let quads = (0..380u32).filter(|k| k % 20 < 19);
+    let mesh = (grid, quads.flat_map(|a| [[a, a + 1, a + 20], [a + 1, a + 21, a + 20]]).collect());
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for layout in Layout::ALL {
+        let builder = builder(layout, &mesh, &[DAffine3::IDENTITY]);
+        let scene = builder.clone().build().expect("a grid");
+        let path = folder.path().join(layout.name());
+        std::fs::write(&path, scene.save_trees()).expect("room for a file");
+        let file = std::fs::File::open(&path).expect("the file");
+        // SAFETY: nobody changes the file while it is mapped: it lies in a folder of this test's own.
+        let mapped = unsafe { memmap2::Mmap::map(&file) }.expect("a map of the file");
+        let again = builder.build_with_trees(&mapped).expect("its trees");
+        // Nothing of it is kept.
+        drop(mapped);
+        std::fs::remove_file(&path).expect("the file");
+        let ends: Vec<_> =
+            (0..100).map(|k| f64::from(k) / 100.0 - 0.5).map(|x| (DVec3::new(x, 1.0, -x), DVec3::X * x)).collect();
+        same(&scene, &again, &rays(&scene, &ends)).expect("the same answers");
+        assert_eq!(again.validate(), Ok(()));
+    }
+}
+
 /// A real mesh: as before, and files changed in many places.
 #[test]
 fn the_bunny_from_a_file() {

@@ -77,6 +77,10 @@ impl Scene {
 impl SceneBuilder {
     /// As [`SceneBuilder::build`], with trees of the shapes that [`Scene::save_trees`] has saved: the same answers, sooner.
     ///
+    /// The bytes may be a map of the file (of the crate memmap2, say): they are read from front to back, and nothing of them is
+    /// kept, so that the file may change or go as soon as this has returned. (While it is read it must not change; so no
+    /// map is made in here.)
+    ///
     /// # Errors
     /// When the file is foreign, damaged, or of other meshes or another layout: then [`SceneBuilder::build`] is what is left. And
     /// when the scene cannot be built.
