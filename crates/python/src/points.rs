@@ -89,6 +89,27 @@ pub(crate) fn closest(
     Ok(ClosestPoints::new(points.shape, found, places))
 }
 
+pub(crate) fn furthest(
+    scene: &Scene,
+    py: Python<'_>,
+    points: &Bound<'_, PyAny>,
+    threads: usize,
+) -> PyResult<ClosestPoints> {
+    let points = Points::new(points)?;
+    let part = points.part();
+    let mut found = Found::zeroed(points.count);
+    let mut places = Values::all([0.0; 3], points.count);
+    let parts = found.slots().chunks(CHUNK).into_iter().zip(places.chunks_mut(CHUNK)).collect();
+    in_chunks(py, (points.count, |i| part.vector(i)), threads, parts, |points, (mut slots, places)| {
+        let mut furthest = vec![None; points.len()];
+        scene.trees().furthest_points(points, &mut furthest);
+        for (i, (far, place)) in furthest.iter().zip(places).enumerate() {
+            slots.set_nearest(i, far.as_ref(), place);
+        }
+    })?;
+    Ok(ClosestPoints::new(points.shape, found, places))
+}
+
 pub(crate) fn distance<'py>(
     scene: &Scene,
     py: Python<'py>,

@@ -420,6 +420,17 @@ impl Scene {
     }
 
     #[pyo3(signature = (points, *, mask=None, threads=0))]
+    fn furthest_point(
+        &self,
+        py: Python<'_>,
+        points: &Bound<'_, PyAny>,
+        mask: Option<u32>,
+        threads: usize,
+    ) -> PyResult<ClosestPoints> {
+        points::furthest(&self.seen(py, mask), py, points, threads)
+    }
+
+    #[pyo3(signature = (points, *, mask=None, threads=0))]
     fn distance<'py>(
         &self,
         py: Python<'py>,

@@ -39,6 +39,19 @@ def test_nearest_points_are_those_of_trimesh(spot, scene, points):
     assert np.array_equal(scene.distance(points), nearest.distance)
 
 
+def test_furthest_points_are_vertices(spot, scene, points):
+    furthest = scene.furthest_point(points)
+    used = spot.vertices[np.unique(spot.faces)]
+    distances = np.linalg.norm(points[:, None] - used[None], axis=2)
+    assert np.abs(furthest.distance - distances.max(axis=1)).max() < 1e-6
+    corners = spot.vertices[spot.faces[furthest.primitive_ids]]
+    corner = np.argmax([np.ones(len(points)) - furthest.primitive_uvs.sum(axis=1), *furthest.primitive_uvs.T], axis=0)
+    assert np.abs(corners[np.arange(len(points)), corner] - furthest.points).max() < 1e-6
+    one = scene.furthest_point(points[7], threads=1)
+    assert all(np.array_equal(one[key], furthest[key][7]) for key in furthest.keys())
+    assert scene.furthest_point([np.nan, 0, 0]).primitive_ids == firsthit.INVALID_ID
+
+
 def test_shapes_and_types(scene, points):
     for shape in [(), (0,), (7,), (4, 10, 100)]:
         p = points[: int(np.prod(shape))].reshape(*shape, 3)

@@ -91,14 +91,14 @@ class HitLists:
 
 @final
 class ClosestPoints:
-    """The nearest point of the surface for each point. It also indexes like a dictionary: ``nearest["points"]``."""
+    """The nearest (or furthest) point of the surface for each point. It also indexes like a dictionary: ``nearest["points"]``."""
 
     @property
     def shape(self) -> tuple[int, ...]:
         """The leading shape of the points."""
     @property
     def points(self) -> NDArray[np.float64]:
-        """The nearest points, shape ``(..., 3)``; NaN where there is none."""
+        """The points of the surface, shape ``(..., 3)``; NaN where there is none."""
     @property
     def distance(self) -> NDArray[np.float64]:
         """How far they are; infinity where there is none."""
@@ -237,6 +237,10 @@ class Scene:
     ) -> ClosestPoints:
         """The nearest point of the surface (of files: of shapes too), for points of shape ``(..., 3)``; with a radius, one for all or one for
         each, only if it is not farther."""
+    def furthest_point(
+        self, points: ArrayLike, *, mask: int | None = None, threads: int = 0
+    ) -> ClosestPoints:
+        """The furthest point of the triangles, a vertex, for points of shape ``(..., 3)``."""
     def distance(self, points: ArrayLike, *, mask: int | None = None, threads: int = 0) -> NDArray[np.float64]:
         """How far the surface is; infinity if there is none, NaN for a point that is not finite."""
     def signed_distance(
