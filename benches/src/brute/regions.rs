@@ -10,6 +10,7 @@ use glam::{DMat3, DVec3};
 use super::tally::Source;
 
 /// A region of any kind.
+#[allow(clippy::large_enum_variant, reason = "a few hundred at a time")]
 #[derive(Clone, Debug)]
 pub enum Asked {
     /// Along the axes.

@@ -117,7 +117,7 @@ fn what_moves_is_blurred_while_the_shutter_is_open() {
     let folder = Folder::new();
     folder.render(&["--animation-time", "0.5", "-o", "sharp.exr"]);
     let said = folder.render(&["--animation-time", "0.5", "--shutter", "500ms", "-o", "blurred.exr"]);
-    assert!(said.contains("the shape of 1 meshes: as when the shutter opens, not blurred"), "{said}");
+    assert!(!said.contains("not blurred"), "{said}");
     assert!(folder.read("sharp.exr") != folder.read("blurred.exr"));
 }
 

@@ -55,7 +55,8 @@ pub use firsthit_render as render;
 pub use glam;
 
 pub use firsthit_accel::{
-    BodyHit, BuildOptions, ClosestPoint, Crossings, CurveSegment, Geometry, GroupMember, Hit, HitId, Part, Scene,
-    SceneBuilder, SceneUpdate, Separation, SignMethod, Solid, SphereHit, SurfacePoint, View, VisitedTriangle, Visitor,
+    BodyHit, BuildOptions, ClosestPoint, Crossings, CurveSegment, Geometry, GroupMember, Hit, HitId, Moments, Part,
+    Scene, SceneBuilder, SceneUpdate, Separation, SignMethod, Solid, SphereHit, SurfacePoint, View, VisitedTriangle,
+    Visitor,
 };
 pub use firsthit_geometry::{Aabb, Precision, Ray, Shape};

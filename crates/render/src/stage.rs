@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use firsthit_accel::{Geometry, Hit, HitId, SurfacePoint};
+use firsthit_accel::{Geometry, Hit, HitId, Moments, SurfacePoint};
 use firsthit_import::SceneDesc;
 use firsthit_import::scene::MaterialDesc;
 use glam::{DAffine3, DVec3, Vec3};
@@ -327,34 +327,33 @@ impl Stage {
             }
         }
         if effects.contains(EffectSet::MOTION) && (moving_camera.is_some() || motion::count(stage.scene()) > 0) {
-            let steps = options.motion_steps.max(1);
-            let moment = |k| {
-                let time = (f64::from(k) + 0.5) / f64::from(steps);
-                let mut moment = stage.at(time, studio)?;
+            let mut worlds = Vec::new();
+            let moments = Moments::new(&stage.accel, options.motion_steps as usize, |time, update| {
+                let (places, bent) = (motion::transforms(stage.scene(), time), motion::bent(stage.scene(), time));
+                places.iter().enumerate().for_each(|(i, place)| _ = update.set_transform(i, *place));
+                bent.iter().for_each(|(i, mesh)| _ = update.move_vertices(*i, Geometry::from_desc(mesh)));
+                worlds.push((time, World::bent(Arc::clone(stage.scene()), places, bent)));
+            });
+            let moments = moments.map_err(|e| StageError::Motion(e.to_string()))?;
+            let moment = |((time, world), accel): ((f64, World), &firsthit_accel::Scene)| {
+                let mut moment = stage.at(world, accel.clone(), studio);
                 if let Some(camera) = moving_camera.as_ref().and_then(|camera| motion::camera(camera, time)) {
                     let camera = as_asked(Camera::from_desc(&camera, &stage.accel.bounds())?, options)?;
                     moment.camera = if stage.camera.has_lens() { camera } else { camera.without_lens() };
                 }
                 Ok::<_, StageError>(moment)
             };
-            stage.moments = (0..steps).map(moment).collect::<Result<_, _>>()?;
+            stage.moments = worlds.into_iter().zip(moments.scenes()).map(moment).collect::<Result<_, _>>()?;
         }
         Ok(stage)
     }
 
-    /// The same at another time, from 0, when the shutter opens, to 1, when it closes.
-    fn at(&self, time: f64, studio: bool) -> Result<Self, StageError> {
-        let places = motion::transforms(self.scene(), time);
-        let bent = motion::bent(self.scene(), time);
-        let mut update = self.accel.update();
-        places.iter().enumerate().for_each(|(i, place)| _ = update.set_transform(i, *place));
-        bent.iter().for_each(|(i, mesh)| _ = update.move_vertices(*i, Geometry::from_desc(mesh)));
-        let (accel, _) = update.finish().map_err(|e| StageError::Motion(e.to_string()))?;
-        let world = World::bent(Arc::clone(self.scene()), places, bent);
+    /// The same at another moment.
+    fn at(&self, world: World, accel: firsthit_accel::Scene, studio: bool) -> Self {
         let area = glowing(&world, &self.materials, &self.dark, self.plan.simulated());
         let followed = is_followed(self.plan.simulated());
         let choice = LightChoice::new(&self.lights.punctual, &area, self.lights.environment.as_ref(), studio, followed);
-        Ok(Self { world, accel, lights: Lights { area, choice, ..self.lights.clone() }, ..self.clone() })
+        Self { world, accel, lights: Lights { area, choice, ..self.lights.clone() }, ..self.clone() }
     }
 
     /// What comes from a hit on a glowing triangle to one who looks there along a unit direction.

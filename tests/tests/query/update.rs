@@ -4,8 +4,8 @@ use core::ops::ControlFlow;
 use std::sync::Mutex;
 
 use firsthit_accel::{
-    BuildError, BuildOptions, ClosestPoint, Crossings, Geometry, GroupMember, Hit, Layout, Scene, SceneBuilder,
-    SignMethod, Solid,
+    BuildError, BuildOptions, ClosestPoint, Crossings, Geometry, GroupMember, Hit, Layout, Moments, Scene,
+    SceneBuilder, SignMethod, Solid,
 };
 use firsthit_geometry::overlap::Sphere;
 use firsthit_geometry::{Precision, Ray, shapes};
@@ -85,6 +85,47 @@ fn agree(scene: &Scene, (other, ids): &(Scene, Vec<u32>), ends: &[(DVec3, DVec3)
 
 /// One change: which kind, to what, and what it becomes.
 type Change = (u8, prop::sample::Index, prop::sample::Index, DAffine3, Mesh);
+
+/// Rays with a time each: the answers of a scene built anew for the middle of the step that the time falls to.
+#[test]
+fn moments_answer_as_scenes_built_anew_for_their_times() {
+    let corners = |x: f32| [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z].map(|p| p + Vec3::X * x).to_vec();
+    let faces = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+    let bent = |time: f64| corners(2.0).iter().map(|p| *p + Vec3::Y * (time as f32 * p.x * p.x)).collect();
+    let turned = |time: f64| DAffine3::from_rotation_y(3.0 * time) * DAffine3::from_translation(DVec3::Z * time);
+    let at = |time: f64| {
+        let mut builder = SceneBuilder::default();
+        for positions in [corners(0.0), bent(time)] {
+            let mesh = builder.add_mesh(vec![Geometry::Triangles { positions, triangles: faces.clone() }]);
+            builder.add_instance(mesh, if mesh == 0 { turned(time) } else { DAffine3::IDENTITY });
+        }
+        builder.build().expect("good meshes")
+    };
+    for steps in [0, 1, 7] {
+        let moments = Moments::new(&at(0.0), steps, |time, update| {
+            update.set_transform(0, turned(time));
+            update.move_vertices(1, vec![Geometry::Triangles { positions: bent(time), triangles: faces.clone() }]);
+        })
+        .expect("good moments");
+        assert_eq!(moments.scenes().len(), steps.max(1));
+        let mut met = 0;
+        for k in 0..400 {
+            let time = f64::from(k) / 399.0;
+            let expected = Moments::middle(moments.step(time), steps.max(1));
+            assert!((time - expected).abs() <= 0.5 / steps.max(1) as f64 + 1e-12);
+            let across = f64::from(k * 37 % 400) / 100.0 - 0.5;
+            let ray = Ray::new(DVec3::new(across, 0.3, 9.0), DVec3::new(0.02, 0.01, -1.0));
+            let hit = moments.at(time).closest_hit(&ray);
+            assert_eq!(hit, at(expected).closest_hit(&ray));
+            met += usize::from(hit.is_some());
+        }
+        assert!(met > 50, "{met}");
+        assert_eq!([f64::NAN, -1.0, 0.0].map(|t| moments.step(t)), [0; 3]);
+        assert_eq!([1.0, 7.0, f64::INFINITY].map(|t| moments.step(t)), [steps.max(1) - 1; 3]);
+    }
+    let wrong = Moments::new(&at(0.0), 3, |_, update| _ = update.set_transform(9, DAffine3::IDENTITY));
+    assert!(matches!(wrong, Err(BuildError::NoSuchInstance { instance: 9, .. })));
+}
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(60))]
