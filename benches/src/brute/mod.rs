@@ -24,10 +24,18 @@ pub mod tally;
 use firsthit_accel::{BuildOptions, Geometry, Scene, SceneBuilder};
 use firsthit_geometry::Precision;
 use firsthit_measure::mesh::Mesh;
+use firsthit_measure::random::Rng;
 use glam::{DAffine3, DVec3};
 
 /// Of so many queries one is put to all triangles.
 pub const UNSIEVED: usize = 2000;
+
+/// One of the triangles, from any of its corners on.
+fn any_triangle(corners: &[[DVec3; 3]], rng: &mut Rng) -> [DVec3; 3] {
+    let mut triangle = corners[rng.below(corners.len())];
+    triangle.rotate_left(rng.below(3));
+    triangle
+}
 
 /// A scene of one mesh at the exact tier, all of it scaled by a power of two.
 ///

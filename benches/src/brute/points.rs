@@ -3,6 +3,7 @@
 use firsthit_measure::random::Rng;
 use glam::DVec3;
 
+use super::any_triangle;
 use super::tally::Source;
 
 /// Makes points at a mesh.
@@ -45,9 +46,7 @@ impl<'a> Points<'a> {
     }
 
     fn triangle(&mut self) -> [DVec3; 3] {
-        let mut triangle = self.corners[self.rng.below(self.corners.len())];
-        triangle.rotate_left(self.rng.below(3));
-        triangle
+        any_triangle(self.corners, &mut self.rng)
     }
 
     fn weights(&mut self) -> (f64, f64) {

@@ -4,6 +4,7 @@ use firsthit_geometry::Ray;
 use firsthit_measure::random::Rng;
 use glam::DVec3;
 
+use super::any_triangle;
 use super::tally::Source;
 
 /// Makes rays at a mesh.
@@ -60,9 +61,7 @@ impl<'a> Rays<'a> {
     }
 
     fn triangle(&mut self) -> [DVec3; 3] {
-        let mut triangle = self.corners[self.rng.below(self.corners.len())];
-        triangle.rotate_left(self.rng.below(3));
-        triangle
+        any_triangle(self.corners, &mut self.rng)
     }
 
     /// A small number of few digits: what it is multiplied with is not rounded.

@@ -7,6 +7,7 @@ use firsthit_geometry::{Aabb, Ray};
 use firsthit_measure::random::Rng;
 use glam::{DMat3, DVec3};
 
+use super::any_triangle;
 use super::tally::Source;
 
 /// A region of any kind.
@@ -169,9 +170,7 @@ impl<'a> Regions<'a> {
     }
 
     fn triangle(&mut self) -> [DVec3; 3] {
-        let mut triangle = self.corners[self.rng.below(self.corners.len())];
-        triangle.rotate_left(self.rng.below(3));
-        triangle
+        any_triangle(self.corners, &mut self.rng)
     }
 
     fn frame(&mut self) -> DMat3 {

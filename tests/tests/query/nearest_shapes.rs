@@ -8,34 +8,13 @@ use firsthit_accel::{
 };
 use firsthit_geometry::distance::Feature;
 use firsthit_geometry::shapes::{ClosestOnSurface, Cuboid, Disk, Plane, Polygon, Quadric, Sphere};
-use firsthit_geometry::{Aabb, Primitive, Ray, Shape, SurfaceHit, shapes};
+use firsthit_geometry::{Aabb, Ray, Shape, SurfaceHit, shapes};
 use glam::{DAffine3, DVec3, Vec3};
 use proptest::prelude::*;
 
 use crate::nearest::same;
 use crate::single::{mesh, place, vector};
-
-/// Spheres as a user would write them.
-#[derive(Debug)]
-struct Balls(Vec<Sphere<f64>>);
-
-impl UserPrimitives for Balls {
-    fn count(&self) -> u32 {
-        self.0.len() as u32
-    }
-    fn bounds(&self, i: u32) -> Aabb<f64> {
-        self.0[i as usize].bounds()
-    }
-    fn closest_hit(&self, i: u32, ray: &Ray<f64>) -> Option<SurfaceHit<f64>> {
-        self.0[i as usize].closest_hit(ray)
-    }
-    fn closest_point(&self, i: u32, point: DVec3) -> Option<ClosestOnSurface> {
-        let ball = &self.0[i as usize];
-        let outward = (point - ball.center()).normalize_or(DVec3::X);
-        let point = ball.center() + outward * ball.radius();
-        Some(ClosestOnSurface { point, u: 0.25, v: 0.5, normal: Some(outward) })
-    }
-}
+use crate::user::Balls;
 
 /// One of each shape, about a place.
 fn shapes_at(at: DVec3, axis: DVec3, size: f64) -> Vec<Shape<f64>> {

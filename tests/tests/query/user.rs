@@ -5,14 +5,16 @@ use std::sync::Arc;
 use firsthit_accel::{
     BuildError, BuildOptions, Crossings, Geometry, Hit, HitId, Layout, Scene, SceneBuilder, UserPrimitives, reference,
 };
-use firsthit_geometry::{Aabb, Precision, Primitive, Ray, SurfaceHit, shapes::Sphere};
+use firsthit_geometry::shapes::{ClosestOnSurface, Sphere};
+use firsthit_geometry::{Aabb, Precision, Primitive, Ray, SurfaceHit};
 use glam::{DVec3, Vec3};
 use proptest::prelude::*;
 
 use crate::single::{mesh, place, vector};
 
+/// Spheres as a user would write them.
 #[derive(Debug)]
-struct Balls(Vec<Sphere<f64>>);
+pub(crate) struct Balls(pub(crate) Vec<Sphere<f64>>);
 
 impl UserPrimitives for Balls {
     fn count(&self) -> u32 {
@@ -26,6 +28,12 @@ impl UserPrimitives for Balls {
     }
     fn refine(&self, i: u32, point: DVec3, normal: Option<DVec3>) -> (DVec3, f64) {
         self.0[i as usize].refine(point, normal)
+    }
+    fn closest_point(&self, i: u32, point: DVec3) -> Option<ClosestOnSurface> {
+        let ball = &self.0[i as usize];
+        let outward = (point - ball.center()).normalize_or(DVec3::X);
+        let point = ball.center() + outward * ball.radius();
+        Some(ClosestOnSurface { point, u: 0.25, v: 0.5, normal: Some(outward) })
     }
 }
 
